@@ -150,10 +150,10 @@ def crosstalk_of_arrays(rounds: int) -> None:
     for name, layout in (("16 x 16", grid), ("256 scattered", listed)):
         array = load_array({"name": "bench", "array": "pockets", "unit": unit, "layout": layout})
         units = Decays(array)
-        variant, distances = units.inputs[0], units.pairs.centre
+        variant, distances = units.inputs[0], units.centre
         jobs: dict[str, Callable[[], object]] = {
             "crosstalk, whole": lambda array=array: crosstalk(array),
-            "matrix, one radial response": lambda units=units, far=distances: units.matrix(far, "flat"),
+            "matrix, one radial response": lambda units=units: units.both("flat"),
             f"{SINGLE} pairs alone": lambda variant=variant, far=distances: [
                 decay(variant, np.array([1e-3 * r])) for r in far[0, 1 : SINGLE + 1]
             ],

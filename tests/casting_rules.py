@@ -1,13 +1,8 @@
 """What a casting procedure must never say: each rule reads the procedure's data and names what breaks it."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Iterable, Iterator
 
 from unitcad.casting.pouring import LEVEL_AGAIN, TACK
-from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import BenchStep
 from unitcad.text import spaced
 
 WORDS = {
@@ -38,18 +33,18 @@ WORDS = {
 """What a step's words name, in lower case, and the line of the bill that it asks for."""
 
 
-def layers_named(texts: Iterable[str]) -> list[int]:
+def layers_named(texts):
     """The layers (from 0, -1 for the last) whose silicone an assembly's words ask for."""
     said = re.findall(r"(?:Layer (\d+)|(last) layer)'s silicone", " ".join(texts))
     return [-1 if last else int(layer) - 1 for layer, last in said]
 
 
-def broken_rules(procedure: Procedure) -> list[str]:
+def broken_rules(procedure):
     """Return what a procedure does wrong, one sentence each; empty where it keeps every rule."""
     return [fault for rule in RULES for fault in rule(procedure)]
 
 
-def _agent(procedure: Procedure) -> Iterator[str]:
+def _agent(procedure):
     """Keep release agent off what bonds later, and off every pour but the last."""
     bonds = {bond.face: bond.to for bond in procedure.bonds}
     last = procedure.pours[-1].index
@@ -64,7 +59,7 @@ def _agent(procedure: Procedure) -> Iterator[str]:
                 yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, not on the last cup's bore"
 
 
-def _degassing(procedure: Procedure) -> Iterator[str]:
+def _degassing(procedure):
     """Degas every pour where there is a vacuum; ask for nothing that needs one where there is none."""
     for pour in procedure.pours:
         says = any(step.text.startswith("Degas for") for step in pour.steps)
@@ -78,7 +73,7 @@ def _degassing(procedure: Procedure) -> Iterator[str]:
         yield f"the bill asks for a vacuum that is not there: {', '.join(needs)}"
 
 
-def _held(procedure: Procedure) -> Iterator[str]:
+def _held(procedure):
     """Hold an open cup down before it is struck off, and pull the tongue before a cup is lifted."""
     for pour in procedure.pours:
         strike, hold = _titled(pour.steps, "Strike off"), _titled(pour.steps, f"Hold cup {pour.index} down")
@@ -91,7 +86,7 @@ def _held(procedure: Procedure) -> Iterator[str]:
             yield f"pour {pour.index}: the cup is lifted over a tongue"
 
 
-def _greased(procedure: Procedure) -> Iterator[str]:
+def _greased(procedure):
     """Grease what seals a cup's slots before the cup hides it, with petroleum jelly, and say on which faces."""
     for pour in procedure.pours:
         titles = [step.title for step in pour.steps]
@@ -104,14 +99,14 @@ def _greased(procedure: Procedure) -> Iterator[str]:
                 yield f"pour {pour.index}: does not say what to grease with, or which faces"
 
 
-def _lifted(procedure: Procedure) -> Iterator[str]:
+def _lifted(procedure):
     """Lift the mould off the bench before a filament is pulled from under it."""
     for step in procedure.release:
         if step.title == "Filament out" and not step.text.startswith("Lift the mould off the bench"):
             yield "the filaments are pulled out while the mould lies on them"
 
 
-def _cleared(procedure: Procedure) -> Iterator[str]:
+def _cleared(procedure):
     """Clear every window that resin may close, before the post-cure."""
     clear, cure = _first(procedure.preparation, "Clear the windows"), _first(procedure.preparation, "post-cure, bake")
     for cup in procedure.tunnels:
@@ -119,7 +114,7 @@ def _cleared(procedure: Procedure) -> Iterator[str]:
             yield f"the window of {cup} is not cleared of resin before the post-cure"
 
 
-def _shown(procedure: Procedure) -> Iterator[str]:
+def _shown(procedure):
     """Show every step in which a piece of the mould is put on, moved or taken off."""
     moving = re.compile(
         r"^(Cup \d+ (on|off)|Lid|Tongue|Filament|Grease the fl|Hold|Pour$|Strike|Inject|Peel|Base|Push|Level|Try)"
@@ -129,13 +124,13 @@ def _shown(procedure: Procedure) -> Iterator[str]:
             yield f"{step.title}: has no picture"
 
 
-def _levelled(procedure: Procedure) -> Iterator[str]:
+def _levelled(procedure):
     """Level the mould before the first pour, and say how to see it."""
     if not any("level" in step.text and "with paper" in step.text for step in procedure.preparation):
         yield "nothing says how the mould is levelled"
 
 
-def _cured(procedure: Procedure) -> Iterator[str]:
+def _cured(procedure):
     """Cure before a mould is opened, for the silicone's whole time, and say how to tell that it is done."""
     for pour in procedure.pours:
         cures = [i for i, step in enumerate(pour.steps) if step.kind == "cure"]
@@ -153,7 +148,7 @@ def _cured(procedure: Procedure) -> Iterator[str]:
         yield "what holds the motor is not cured"
 
 
-def _enough(procedure: Procedure) -> Iterator[str]:
+def _enough(procedure):
     """Mix what the cavities, and a syringe, take."""
     for pour in procedure.pours:
         values = {figure.name: figure.value for figure in pour.figures}
@@ -166,14 +161,14 @@ def _enough(procedure: Procedure) -> Iterator[str]:
             yield f"pour {pour.index}: nothing says what the syringe holds back"
 
 
-def _gripped(procedure: Procedure) -> Iterator[str]:
+def _gripped(procedure):
     """Give a cut tongue a grip."""
     for step in procedure.preparation:
         if step.title == "Cut the tongues" and "you pull by" not in step.text:
             yield "a cut tongue has nothing to pull it by"
 
 
-def _propped(procedure: Procedure) -> Iterator[str]:
+def _propped(procedure):
     """Bear the grip of every tongue that stands, and look at the ledge only where nothing covers it."""
     for pour in procedure.pours:
         for step in pour.steps:
@@ -183,7 +178,7 @@ def _propped(procedure: Procedure) -> Iterator[str]:
                 yield f"pour {pour.index}: asks to look at a ledge that Layer 1 covers"
 
 
-def _listed(procedure: Procedure) -> Iterator[str]:
+def _listed(procedure):
     """List every tool and consumable that a step names."""
     items = {item.item for item in procedure.bill}
     for step in _all(procedure):
@@ -192,7 +187,7 @@ def _listed(procedure: Procedure) -> Iterator[str]:
                 yield f"the bill lacks what a step names: {item}"
 
 
-def _bought(procedure: Procedure) -> Iterator[str]:
+def _bought(procedure):
     """Buy what the pours take of each silicone, and the ring's batch on top."""
     bought = {item.item: item.quantity for item in procedure.bill}
     batches = [(pour.material, pour.part_a_g + pour.part_b_g) for pour in procedure.pours]
@@ -205,14 +200,14 @@ def _bought(procedure: Procedure) -> Iterator[str]:
             yield f"the bill lacks silicone: {material}"
 
 
-def _timed(procedure: Procedure) -> Iterator[str]:
+def _timed(procedure):
     """Give every step its time: at the bench, or as a wait."""
     for step in _all(procedure):
         if not step.minutes and not step.wait_min:
             yield f"{step.title}: takes no time"
 
 
-def _level_again(procedure: Procedure) -> Iterator[str]:
+def _level_again(procedure):
     """Look at the level again once tape or bands run under the plate."""
     for pour in procedure.pours:
         cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
@@ -220,7 +215,7 @@ def _level_again(procedure: Procedure) -> Iterator[str]:
             yield f"pour {pour.index}: nothing says to look at the level again"
 
 
-def _mixed_first(procedure: Procedure) -> Iterator[str]:
+def _mixed_first(procedure):
     """Use no mix before it is weighed and mixed."""
     for pour in procedure.pours:
         mixed = next((i for i, step in enumerate(pour.steps) if step.kind == "mix"), len(pour.steps))
@@ -229,7 +224,7 @@ def _mixed_first(procedure: Procedure) -> Iterator[str]:
                 yield f"pour {pour.index}: {step.title} uses the mix before it is mixed"
 
 
-def _fixed(procedure: Procedure) -> Iterator[str]:
+def _fixed(procedure):
     """Let the ring cure as long as the silicone that the steps name for it, and adhesive for a day."""
     silicones = [pour.material for pour in procedure.pours]
     hours = {pour.material: pour.cure_h for pour in procedure.pours}
@@ -265,18 +260,18 @@ RULES = (
 )
 
 
-def _all(procedure: Procedure) -> Iterator[BenchStep]:
+def _all(procedure):
     yield from procedure.preparation
     for pour in procedure.pours:
         yield from pour.steps
     yield from (*procedure.release, *procedure.assembly)
 
 
-def _titled(steps: tuple[BenchStep, ...], title: str) -> int | None:
+def _titled(steps, title):
     """Return the number of the step (from 0) of that title."""
     return next((i for i, step in enumerate(steps) if step.title == title), None)
 
 
-def _first(steps: tuple[BenchStep, ...], words: str) -> int | None:
+def _first(steps, words):
     """Return the number of the first step (from 0) that says so."""
     return next((i for i, step in enumerate(steps) if words in step.text), None)

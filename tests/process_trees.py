@@ -1,15 +1,11 @@
 """Processes that a test started, and those below them."""
 
-from __future__ import annotations
-
-import subprocess
 import time
-from collections.abc import Callable
 
 import psutil
 
 
-def until(true: Callable[[], object], seconds: float = 60.0) -> None:
+def until(true, seconds=60.0):
     """Wait until a condition holds."""
     end = time.monotonic() + seconds
     while not true():
@@ -17,13 +13,13 @@ def until(true: Callable[[], object], seconds: float = 60.0) -> None:
         time.sleep(0.02)
 
 
-def below(process: subprocess.Popen[str] | subprocess.Popen[bytes], least: int = 1) -> list[psutil.Process]:
+def below(process, least=1):
     """Return all processes below one, once there are at least so many."""
     until(lambda: len(psutil.Process(process.pid).children(recursive=True)) >= least)
     return psutil.Process(process.pid).children(recursive=True)
 
 
-def left(processes: list[psutil.Process], seconds: float = 10.0) -> list[str]:
+def left(processes, seconds=10.0):
     """Return the names of the processes that still run after some seconds; one that only waits to be reaped is gone."""
     end = time.monotonic() + seconds
     while running := [name for process in processes if (name := _running(process))]:
@@ -33,7 +29,7 @@ def left(processes: list[psutil.Process], seconds: float = 10.0) -> list[str]:
     return running
 
 
-def _running(process: psutil.Process) -> str:
+def _running(process):
     try:
         return "" if process.status() == psutil.STATUS_ZOMBIE else process.name()
     except psutil.NoSuchProcess:

@@ -1,7 +1,5 @@
 """Bodies much like a unit and its tooling, drawn by hand: kernels and exports are tried on them, and on templates."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -33,7 +31,7 @@ LETTER_O = Extrude(rounded_rectangle(1.5, 2.0, 1.0), 0, 0.4, holes=(rounded_rect
 LETTER_L = Extrude(polygon((0, 0), (2, 0), (2, 0.8), (0.8, 0.8), (0.8, 4), (0, 4)), 0, 0.4)
 
 
-def base() -> Body:
+def base():
     """A plate with a keyed, tapered plinth, a core, a hole, a bent groove below, and engraved characters."""
     body = union(
         [
@@ -47,7 +45,7 @@ def base() -> Body:
     return Body("base", "tool", "base", cut(body, [cylinder(0.975, -9, 4), groove, *labels]), (0.55, 0.6, 0.65))
 
 
-def cup() -> Body:
+def cup():
     """A one-piece cup: bore, plinth recess with clearance, overflow groove, a window for the tongue."""
     block = Extrude(rounded_rectangle(17, 17, 3, key=4), -1.6, 4.61)
     tools = [
@@ -59,7 +57,7 @@ def cup() -> Body:
     return Body("cup2", "tool", "cup", cut(block, tools), (0.85, 0.55, 0.2), upside_down=True)
 
 
-def layers() -> tuple[Body, Body]:
+def layers():
     """Two layers of an encapsulating unit, both slotted on one side."""
     return (
         Body(
@@ -75,13 +73,13 @@ def layers() -> tuple[Body, Body]:
     )
 
 
-def tongue() -> Body:
+def tongue():
     """A strip, drawn upright and turned twice: a tree with placements."""
     strip = turned(turned(box(-1.5, 1.5, 0, 0.5, 4, 24), "y", 1), "x", 1)
     return Body("tongue", "tool", "tongue", moved(strip, 0, 0, 2), (0.2, 0.6, 0.5))
 
 
-def filleted() -> Body:
+def filleted():
     """A revolved body with arcs in its profile, touching the axis, shared with a lens."""
     dome = Revolve(Profile(((0, 0, 0), (5, 0, 0), (5, 2, QUARTER), (4, 3, 0), (3, 3, -QUARTER), (2, 4, 0), (0, 4, 0))))
     return Body(
@@ -89,7 +87,7 @@ def filleted() -> Body:
     )
 
 
-def gang() -> Body:
+def gang():
     """A plate with six cores that stand on it and six holes through them: many tools in one node."""
     places = [(18.0 * i, 18.0 * j) for i in range(3) for j in range(2)]
     cores = [moved(cylinder(4.5, 0, 2.11), x, y) for x, y in places]
@@ -97,11 +95,11 @@ def gang() -> Body:
     return Body("gang", "tool", "base", cut(union([box(-12, 48, -12, 30, -6, 0), *cores]), holes), (0.5, 0.5, 0.5))
 
 
-def tube() -> Body:
+def tube():
     """A plain tube."""
     return Body("tube", "tool", "coupon", ring(3, 5, 0, 10), (0.1, 0.2, 0.3))
 
 
-def all_bodies() -> list[Body]:
+def all_bodies():
     """Every sample."""
     return [base(), cup(), *layers(), tongue(), filleted(), gang(), tube()]

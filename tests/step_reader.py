@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
@@ -12,8 +11,7 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopoDS import TopoDS_Shape
-from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from unitcad.kernels import occt
 
@@ -27,7 +25,7 @@ class StepBody:
     measures: occt.Measures
 
 
-def read(path: Path) -> list[StepBody]:
+def read(path):
     """Return the bodies of a STEP assembly in the order of the file."""
     document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
     reader = STEPCAFControl_Reader()
@@ -45,11 +43,11 @@ def read(path: Path) -> list[StepBody]:
     return bodies
 
 
-def _labels(sequence: TDF_LabelSequence) -> list[TDF_Label]:
+def _labels(sequence):
     return [sequence.Value(i) for i in range(1, sequence.Length() + 1)]
 
 
-def _body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
+def _body(label, colours):
     part = TDF_Label()
     if not XCAFDoc_ShapeTool.GetReferredShape_s(label, part):
         part = label
@@ -61,7 +59,7 @@ def _body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
     return StepBody(text, colour, occt.measure(XCAFDoc_ShapeTool.GetShape_s(label)))
 
 
-def _colour(solid: TopoDS_Shape, colours: XCAFDoc_ColorTool) -> tuple[float, float, float] | None:
+def _colour(solid, colours):
     quantity = Quantity_Color()
     for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
         if colours.GetColor(solid, kind, quantity):

@@ -1,7 +1,5 @@
 """What is unwise in a spec: the roof over a wide cavity, the ring of air round the motor, leads without a way out."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -15,7 +13,7 @@ from unitcad.validation.defaults import MOTOR_G_CM3, roof
 ONE = ("single-encapsulating",)
 
 
-def annulus(outer: float, inner: float, rigidity: float, load_n: float) -> float:
+def annulus(outer, inner, rigidity, load_n):
     """The sag of a plate clamped at its outer edge that carries a stiff disc: w = c0 + c1 ln r + c2 r2 + c3 r2 ln r."""
     c3 = load_n / (8 * math.pi * rigidity)
     rows = [
@@ -30,7 +28,7 @@ def annulus(outer: float, inner: float, rigidity: float, load_n: float) -> float
 
 
 @pytest.mark.parametrize("diameter", [14.0, 20.0, 30.0])
-def test_a_roof_of_one_silicone_sags_as_a_clamped_plate(diameter: float) -> None:
+def test_a_roof_of_one_silicone_sags_as_a_clamped_plate(diameter):
     spec = load(*ONE, {"diameter_mm": diameter})
     silicone = materials()[spec.layers[0].material]
     thick, outer, inner = spec.layers[0].cap_mm / 1e3, diameter / 2e3 - spec.layers[0].wall_mm / 1e3, 3.5e-3
@@ -44,14 +42,14 @@ def test_a_roof_of_one_silicone_sags_as_a_clamped_plate(diameter: float) -> None
     assert hertz == pytest.approx(math.sqrt(9.80665 / hung) / (2 * math.pi), rel=1e-9)
 
 
-def test_a_cap_cut_in_two_of_one_silicone_changes_nothing() -> None:
+def test_a_cap_cut_in_two_of_one_silicone_changes_nothing():
     layer = "{ material = 'dragon-skin-30', wall_mm = %s, cap_mm = %s }"
     one = load(ONE[0], [f"layers=[{layer % (2.5, 2.5)}]"])
     two = load(ONE[0], [f"layers=[{layer % (1.0, 0.99)}, {layer % (1.5, 1.51)}]"])
     assert roof(two) == pytest.approx(roof(one), rel=1e-9)
 
 
-def test_a_wide_roof_and_a_wide_ring_are_warned_of_and_a_filled_cavity_is_not() -> None:
+def test_a_wide_roof_and_a_wide_ring_are_warned_of_and_a_filled_cavity_is_not():
     """Planted at 30 mm: 25 mm of air with a motor of 7 mm in it. The templates are as they should be."""
     wide = warnings(load("encapsulating", ["diameter_mm=30"]))
     assert [next(words for words in ("caps", "ring") if words in line) for line in wide] == ["caps", "ring"]
@@ -63,7 +61,7 @@ def test_a_wide_roof_and_a_wide_ring_are_warned_of_and_a_filled_cavity_is_not() 
     assert [warnings(load(name)) for name in templates()] == [[]] * len(templates())
 
 
-def test_leads_without_a_way_out_are_warned_of_and_the_offer_is_accepted() -> None:
+def test_leads_without_a_way_out_are_warned_of_and_the_offer_is_accepted():
     (said,) = warnings(load(LEADLESS))
     assert "[wires] with diameter_mm" in said
     assert warnings(load(LEADLESS, ["wires={ diameter_mm = 0.5 }"])) == []

@@ -1,11 +1,7 @@
 """A file of bodies as a design: STEP, STL and 3MF, their moulds, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +15,7 @@ from unitcad.kernels import mesh
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
-from unitcad.shape import Extrude, Shape, cut, cylinder, polygon
+from unitcad.shape import Extrude, cut, cylinder, polygon
 from unitcad.shape.tree import Body
 from unitcad.spec.body_file import bodies_in
 from unitcad.validation import load
@@ -30,7 +26,7 @@ AREA = 2 * (1 + 0.5) * 0.875
 """Of the hexagon with these corners."""
 
 
-def hexagon(radius: float, top: float) -> Extrude:
+def hexagon(radius, top):
     """Return an upright hexagonal prism, its corners on the grid."""
     return Extrude(polygon(*((radius * x, radius * y) for x, y in CORNERS)), 0, top)
 
@@ -39,19 +35,19 @@ MOTOR = cylinder(3.7, -1, 2)
 INNER, OUTER = cut(hexagon(6.5, 3.25), [MOTOR]), cut(hexagon(8.5, 4.5), [MOTOR])
 
 
-def spec_of(folder: Path, design: str, layers: int = 2, more: str = "") -> Path:
+def spec_of(folder, design, layers=2, more=""):
     """Write a spec of a file of bodies."""
     text = f'name = "bodies"\ndesign = "{design}"\ndiameter_mm = 17.0\n{more}\n{LAYER * layers}'
     (folder / "spec.toml").write_text(text)
     return folder / "spec.toml"
 
 
-def stl_of(shape: Shape) -> bytes:
+def stl_of(shape):
     """Return a shape as STL."""
     return printing.stl(*arrays(realise(shape, 96)), "body")
 
 
-def step_of(folder: Path, **shapes: Shape) -> str:
+def step_of(folder, **shapes):
     """Write shapes as STEP; returns the file's name."""
     pytest.importorskip("OCP")
     from unitcad.export import step
@@ -60,7 +56,7 @@ def step_of(folder: Path, **shapes: Shape) -> str:
     return "body.step"
 
 
-def step_design(folder: Path) -> str:
+def step_design(folder):
     return step_of(folder, layer2=OUTER, layer1=INNER)
 
 
@@ -73,7 +69,7 @@ MODEL = """<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufactur
 <resources>{objects}</resources><build>{items}</build></model>"""
 
 
-def threemf_design(folder: Path) -> str:
+def threemf_design(folder):
     """Write a 3MF in centimetres, each object moved to its place by its item of the build."""
     objects, items = "", ""
     for i, (name, shape) in enumerate((("layer2", OUTER), ("layer1", INNER)), 1):
@@ -91,7 +87,7 @@ def threemf_design(folder: Path) -> str:
 
 
 @pytest.mark.parametrize("written", [step_design, threemf_design])
-def test_bodies_by_name_get_moulds_that_keep_every_check(written: Callable[[Path], str], tmp_path: Path) -> None:
+def test_bodies_by_name_get_moulds_that_keep_every_check(written, tmp_path):
     moulds = MouldSet(load(spec_of(tmp_path, written(tmp_path))))
     assert [finding for finding in check_moulds(moulds) if not finding.ok] == []
     hole = math.pi * 3.7**2 * 2
@@ -100,13 +96,13 @@ def test_bodies_by_name_get_moulds_that_keep_every_check(written: Callable[[Path
     assert moulds.solids["layer2"].volume() == pytest.approx(between, rel=1e-6)
 
 
-def test_bodies_without_such_names_are_layers_in_their_order(tmp_path: Path) -> None:
+def test_bodies_without_such_names_are_layers_in_their_order(tmp_path):
     moulds = MouldSet(load(spec_of(tmp_path, step_of(tmp_path, Inner=INNER, Outer=OUTER))))
     assert [body.name for body in moulds.unit] == ["layer1", "layer2", "motor"]
     assert moulds.solids["layer1"].volume() < moulds.solids["layer2"].volume()
 
 
-def test_a_motor_in_the_file_is_the_unit_s_motor(tmp_path: Path) -> None:
+def test_a_motor_in_the_file_is_the_unit_s_motor(tmp_path):
     name = step_of(tmp_path, layer1=INNER, motor=cylinder(3.5, 0, 1.75))
     moulds = MouldSet(load(spec_of(tmp_path, name, layers=1)))
     (motor,) = [body for body in moulds.unit if body.kind == "motor"]
@@ -114,7 +110,7 @@ def test_a_motor_in_the_file_is_the_unit_s_motor(tmp_path: Path) -> None:
     assert moulds.solids["motor"].volume() == pytest.approx(math.pi * 3.5**2 * 1.75, rel=5e-3)
 
 
-def test_a_result_stands_alone(tmp_path: Path) -> None:
+def test_a_result_stands_alone(tmp_path):
     (tmp_path / "body.stl").write_bytes(stl_of(INNER))
     spec = load(spec_of(tmp_path, "body.stl", layers=1), {"output.formats": ["stl", "step"]})
     done = build(spec, tmp_path / "out")
@@ -127,7 +123,7 @@ def test_a_result_stands_alone(tmp_path: Path) -> None:
         estimate_spec(spec)
 
 
-def test_the_hash_is_of_the_geometry_alone(tmp_path: Path) -> None:
+def test_the_hash_is_of_the_geometry_alone(tmp_path):
     """Facets in another order give the same variant; a corner that moves by a hundredth gives another."""
     vertices, faces = arrays(realise(INNER, 96))
     texts = []
@@ -140,7 +136,7 @@ def test_the_hash_is_of_the_geometry_alone(tmp_path: Path) -> None:
     assert texts[0] == texts[1] != texts[2]
 
 
-def test_a_step_body_s_facets_lie_within_the_stated_tolerance(tmp_path: Path) -> None:
+def test_a_step_body_s_facets_lie_within_the_stated_tolerance(tmp_path):
     spec = load(spec_of(tmp_path, step_of(tmp_path, layer1=cylinder(7, 0, 3)), layers=1))
     assert "facets within 0.01 mm" in str(spec.design_source)
     (held,) = bodies_in(spec.design, str(spec.design_source)).values()
@@ -160,7 +156,7 @@ def test_no_other_design_replaces_a_body_that_can_not_be_cast(tmp_path):
     assert refused.value.others == ()
 
 
-def test_a_body_that_meets_the_motor_is_an_error(tmp_path: Path) -> None:
+def test_a_body_that_meets_the_motor_is_an_error(tmp_path):
     (tmp_path / "body.stl").write_bytes(stl_of(hexagon(6.5, 3.25)))
     done = build(load(spec_of(tmp_path, "body.stl", layers=1)), tmp_path / "out", only=("unit",))
     (finding,) = [finding for finding in done.manifest["mould_checks"] if not finding["ok"]]
@@ -177,9 +173,7 @@ def test_a_body_that_meets_the_motor_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("facets", "passes"), [(24, True), (16, False)])
-def test_a_pocket_that_only_its_facets_make_narrow_passes_with_a_note(
-    facets: int, passes: bool, tmp_path: Path
-) -> None:
+def test_a_pocket_that_only_its_facets_make_narrow_passes_with_a_note(facets, passes, tmp_path):
     """The middles of a pocket's facets are 3.5 (1 - cos(pi / facets)) mm inside the motor: 0.03, or 0.067 mm."""
     turns = [2 * math.pi * i / facets for i in range(facets)]
     pocket = Extrude(polygon(*((3.5 * math.cos(a), 3.5 * math.sin(a)) for a in turns)), -1, 2)
@@ -199,24 +193,24 @@ def test_a_pocket_that_only_its_facets_make_narrow_passes_with_a_note(
         ("custom/strap-lugs", "motor=false", "(fpcb|wires): leads to a motor, and motor = false"),
     ],
 )
-def test_a_unit_without_a_motor_is_a_custom_design_without_circuit(template: str, change: str, why: str) -> None:
+def test_a_unit_without_a_motor_is_a_custom_design_without_circuit(template, change, why):
     with pytest.raises(Refusal, match=why):
         load(template, [change])
 
 
-def _open(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+def _open(vertices, faces):
     return printing.stl(vertices, faces[:-1], "body")
 
 
-def _inverted(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+def _inverted(vertices, faces):
     return printing.stl(vertices, faces[:, ::-1], "body")
 
 
-def _inches(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+def _inches(vertices, faces):
     return printing.stl(vertices / 25.4, faces, "body")
 
 
-def _huge(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+def _huge(vertices, faces):
     return printing.stl(*arrays(realise(cylinder(7, 0, 3), 11000)), "body")
 
 
@@ -232,7 +226,7 @@ def _huge(vertices: np.ndarray, faces: np.ndarray) -> bytes:
         (lambda vertices, faces: b"ISO-10303-21;", "F005: named .stl, but the content is STEP"),
     ],
 )
-def test_a_bad_file_is_refused_with_the_finding_s_code(content: Callable, why: str, tmp_path: Path) -> None:
+def test_a_bad_file_is_refused_with_the_finding_s_code(content, why, tmp_path):
     scale = 0.05 if content is _inches else 1.0
     (tmp_path / "body.stl").write_bytes(content(arrays(realise(INNER, 96))[0] * scale, arrays(realise(INNER, 96))[1]))
     with pytest.raises(Refusal, match=f"design = '{why}" if why.startswith("body") else why) as refused:
@@ -248,13 +242,13 @@ def test_a_bad_file_is_refused_with_the_finding_s_code(content: Callable, why: s
         ("folder.stl", "directory|regular"),
     ],
 )
-def test_a_file_that_is_not_there_is_one_sentence(design: str, why: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_one_sentence(design, why, tmp_path):
     (tmp_path / "folder.stl").mkdir()
     with pytest.raises(Refusal, match=why):
         load(spec_of(tmp_path, design, layers=1))
 
 
-def test_what_goes_with_no_body_is_refused(tmp_path: Path) -> None:
+def test_what_goes_with_no_body_is_refused(tmp_path):
     (tmp_path / "body.stl").write_bytes(stl_of(INNER))
     with pytest.raises(Refusal, match=r"parameters.*nothing reads them"):
         load(spec_of(tmp_path, "body.stl", layers=1), {"parameters.wall": 1.0})
@@ -266,7 +260,7 @@ def test_what_goes_with_no_body_is_refused(tmp_path: Path) -> None:
             build(load(spec, {"design_source": damaged}), tmp_path / "out", only=("unit",))
 
 
-def test_a_layer_without_a_silicone_is_no_printed_part(tmp_path: Path) -> None:
+def test_a_layer_without_a_silicone_is_no_printed_part(tmp_path):
     """A body that is named as a layer is silicone; the spec says which, or is refused."""
     spec = load(spec_of(tmp_path, threemf_design(tmp_path), layers=1))
     with pytest.raises(Refusal, match=r"layers = 1: .* has the body layer2, and the spec has no \[\[layers\]\] table"):
@@ -278,7 +272,7 @@ def test_a_layer_without_a_silicone_is_no_printed_part(tmp_path: Path) -> None:
     assert [body.made for body in unit_bodies(more)] == ["cast", "cast", "bought"]
 
 
-def test_step_without_the_extra_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_step_without_the_extra_is_one_sentence(tmp_path, monkeypatch):
     name = step_design(tmp_path)
     monkeypatch.setattr("unitcad.meshcheck.readers.read_step.find_spec", lambda name: None)
     with pytest.raises(Refusal, match=r"F012: STEP needs the extra"):

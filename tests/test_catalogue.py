@@ -1,7 +1,5 @@
 """Entries of the catalogue: every key has a type, a range and a sentence; shipped ones and a spec's own pass them."""
 
-from __future__ import annotations
-
 import tomllib
 import typing
 from importlib.resources import files
@@ -25,7 +23,7 @@ SKIN = {"density_kg_m3": 1100.0, "poisson_ratio": 0.49, "youngs_modulus_kpa": 10
 
 
 @pytest.mark.parametrize("kind", ENTRIES)
-def test_every_key_has_a_type_a_range_and_a_sentence(kind: str) -> None:
+def test_every_key_has_a_type_a_range_and_a_sentence(kind):
     keys = dict(kinds_of(ENTRIES[kind][0]))
     assert set(keys) == {field.name for field in msgspec.structs.fields(ENTRIES[kind][0])} - {"name"}
     for key, annotated in keys.items():
@@ -39,7 +37,7 @@ def test_every_key_has_a_type_a_range_and_a_sentence(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["materials", "motors", "printers"])
-def test_shipped_entries_pass_the_validation_of_a_own_entries(kind: str) -> None:
+def test_shipped_entries_pass_the_validation_of_a_own_entries(kind):
     """Each shipped table, typed into a spec under another name, is the same entry."""
     _, load, _ = ENTRIES[kind]
     shipped = tomllib.loads((files("unitcad.catalogue") / f"{kind}.toml").read_text("utf-8"))
@@ -70,14 +68,14 @@ def test_shipped_entries_pass_the_validation_of_a_own_entries(kind: str) -> None
     ],
 )
 @pytest.mark.parametrize("form", ["", "value", "low"])
-def test_a_value_that_can_not_be_is_refused(table: str, key: str, value: object, nearest: object, form: str) -> None:
+def test_a_value_that_can_not_be_is_refused(table, key, value, nearest, form):
     """Alone, in a table and as an end of the range; what is offered is accepted in the same place."""
     if form == "low" and (isinstance(value, str) or key == "shore"):
         pytest.skip("words have no range")
     possible = {"poisson_ratio": 0.4, "rpm": 1000.0, "bed_x_mm": 100.0}.get(key, 10.0)
     data = read("encapsulating")
 
-    def give(value: object) -> None:
+    def give(value):
         typed = {"": value, "value": {"value": value}, "low": {"value": possible, "low": value}}[form]
         data[table] = {"ours": {"like": ENTRIES[table][2], key: typed}}
 
@@ -97,7 +95,7 @@ def test_a_value_that_can_not_be_is_refused(table: str, key: str, value: object,
 @pytest.mark.parametrize(
     ("low", "high", "field", "nearest"), [(60.0, None, "low", 50.0), (None, 40.0, "high", 50.0), (60, 40, "low", 50.0)]
 )
-def test_a_value_outside_its_own_range_is_refused(low, high, field: str, nearest: float) -> None:
+def test_a_value_outside_its_own_range_is_refused(low, high, field, nearest):
     data = read("encapsulating")
     given = {"value": 50.0, "low": low, "high": high}
     given = {key: end for key, end in given.items() if end is not None}
@@ -120,13 +118,13 @@ def test_a_value_outside_its_own_range_is_refused(low, high, field: str, nearest
     ],
 )
 @pytest.mark.parametrize("chosen", ["mine", "forearm"])
-def test_a_body_that_can_not_be_is_refused_whether_it_is_used_or_not(body: dict, field: str, chosen: str) -> None:
+def test_a_body_that_can_not_be_is_refused_whether_it_is_used_or_not(body, field, chosen):
     with pytest.raises(Refusal) as refused:
         from_data({**read("encapsulating"), "tissue": {"mine": body}, "estimate": {"tissue": chosen}})
     assert refused.value.field == field
 
 
-def test_an_entry_that_lacks_values_names_them() -> None:
+def test_an_entry_that_lacks_values_names_them():
     data = {**read("encapsulating"), "motors": {"mine": {"rpm": 9000.0}}}
     with pytest.raises(Refusal, match=r"^motors\.mine\.diameter_mm: is required with thickness_mm, or like"):
         from_data(data)
@@ -135,7 +133,7 @@ def test_an_entry_that_lacks_values_names_them() -> None:
         from_data(data)
 
 
-def test_an_own_entry_says_where_its_values_come_from() -> None:
+def test_an_own_entry_says_where_its_values_come_from():
     data = read("encapsulating")
     data["materials"] = {
         "ours": {

@@ -1,13 +1,10 @@
 """The command line: exit codes, one JSON object, no traceback."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from typer.main import get_command
@@ -19,7 +16,7 @@ from unitcad.cli import app
 from unitcad.export import slicer
 
 
-def run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(*words, cwd=None, **environment):
     return subprocess.run(
         [sys.executable, "-m", "unitcad", *words],
         capture_output=True,
@@ -32,7 +29,7 @@ def run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.
 
 
 @pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
-def test_list_names_what_is_shipped(kind: str) -> None:
+def test_list_names_what_is_shipped(kind):
     done = run("list", kind)
     assert done.returncode == 0
     data = json.loads(run("list", kind, "--json").stdout)
@@ -59,7 +56,7 @@ def test_list_names_what_is_shipped(kind: str) -> None:
         ["nothing"],
     ],
 )
-def test_asked_wrongly_is_exit_2_and_writes_nothing(words: list[str], tmp_path: Path) -> None:
+def test_asked_wrongly_is_exit_2_and_writes_nothing(words, tmp_path):
     done = run(*words, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr
@@ -67,14 +64,14 @@ def test_asked_wrongly_is_exit_2_and_writes_nothing(words: list[str], tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_output_that_is_a_file_is_refused(tmp_path: Path) -> None:
+def test_an_output_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "out").write_text("mine")
     done = run("build", "embedded", "--formats", "stl", cwd=tmp_path)
     assert done.returncode == 2
     assert (tmp_path / "out").read_text() == "mine"
 
 
-def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_can_not_be_written_is_one_line(tmp_path):
     if os.geteuid() == 0:
         target = "/proc/none"
     else:
@@ -87,7 +84,7 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("setting", "field"), [("layers.0.cap_mm=500", "layers.0.cap_mm"), ("diameter_mm=900",) * 2])
-def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: str, tmp_path: Path) -> None:
+def test_estimate_says_that_build_would_refuse_the_moulds(setting, field, tmp_path):
     estimated = run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
     built = run("build", "encapsulating", "--set", setting, cwd=tmp_path)
     assert (estimated.returncode, built.returncode) == (0, 2)
@@ -106,11 +103,11 @@ WRONG = {
 
 
 @pytest.mark.parametrize("words", WRONG)
-def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str) -> None:
+def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words):
     check_wrong(words, WRONG[words])
 
 
-def check_wrong(words: str, told: str) -> None:
+def check_wrong(words, told):
     """Check that a command line is refused in one line, the same in JSON."""
     command, *rest = words.split()
     below = rest[:1] if command == "cache" else []
@@ -123,8 +120,8 @@ def check_wrong(words: str, told: str) -> None:
     assert f"error: {json.loads(as_json.stdout)['error']['message']}" == line
 
 
-def _commands() -> dict[str, Any]:
-    whole: Any = get_command(app)
+def _commands():
+    whole = get_command(app)
     shown = {name: whole.get_command(None, name) for name in whole.list_commands(None)}
     return {
         "": whole,
@@ -134,7 +131,7 @@ def _commands() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("command", _commands())
-def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
+def test_help_cuts_no_option_s_name_and_no_square_bracket(command):
     lines = CliRunner().invoke(app, [*command.split(), "--help"], env={"COLUMNS": "80"}).stdout.splitlines()
     assert not [line for line in lines[1:] if line.endswith(("\u2026", "..."))], "a summary is cut"
     shown = " ".join(" ".join(lines[1:]).split())
@@ -146,7 +143,7 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
         assert " ".join((getattr(parameter, "help", None) or "").split()) in shown
 
 
-def test_help_and_version() -> None:
+def test_help_and_version():
     assert "build" in run("--help").stdout
     assert run("--version").stdout.startswith("unitcad 0.")
 
@@ -159,9 +156,7 @@ def test_help_and_version() -> None:
         (["--set", "moulds.printer=sla"], "moulds.printer = 'sla': prints no filament"),
     ],
 )
-def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
-    words: list[str], said: str, tmp_path: Path
-) -> None:
+def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(words, said, tmp_path):
     if slicer.program() is None:
         said = "PrusaSlicer is not installed"
     done = run("build", "embedded", "--slice", *words, cwd=tmp_path)
@@ -170,14 +165,14 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
     assert not (tmp_path / "out").exists()
 
 
-def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:
+def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path):
     gang = ("--set", "moulds.cavities=[2,1]", "--only", "unit,casting", "--no-report", "--set", "motor.thickness_mm=2")
     done = run("build", "embedded", *gang, "-o", str(tmp_path))
     assert done.stderr.startswith("embedded: 2 units, each 14 mm across, 2.11 mm high with its circuit, 2 without, ")
     assert "measure first; assumed: fpcb.thickness_mm = 0.11 (usual stock)\n" in done.stderr
 
 
-def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_output(tmp_path: Path) -> None:
+def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_output(tmp_path):
     """Every figure is that of a file in the folder."""
     done = run("build", "embedded", "--formats", "stl", "-o", str(tmp_path))
     folder = Path(done.stdout.strip())
@@ -222,8 +217,8 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Exception) else "",
 )
-def test_a_library_without_memory_is_no_bug(error: Exception, said: str, monkeypatch, capsys) -> None:
-    def run(words: list[str]) -> int:
+def test_a_library_without_memory_is_no_bug(error, said, monkeypatch, capsys):
+    def run(words):
         raise error
 
     monkeypatch.delenv("UNITCAD_TRACEBACK", raising=False)
@@ -234,7 +229,7 @@ def test_a_library_without_memory_is_no_bug(error: Exception, said: str, monkeyp
     assert capsys.readouterr().err == f"{said}\n"
 
 
-def test_a_mould_check_is_explained_next_to_a_mesh_rule() -> None:
+def test_a_mould_check_is_explained_next_to_a_mesh_rule():
     done = CliRunner().invoke(app, ["check", "--explain", "c210,T001"])
     assert done.exit_code == 0
     assert done.stdout.startswith("C210 gap\n\nFaces that slide have the printer's clearance.\n")

@@ -1,7 +1,5 @@
 """`unitcad build --watch`: a build after every save, a refusal in between, the end by Ctrl-C."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -11,8 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -24,7 +20,7 @@ from unitcad.validation import templates
 
 
 @contextlib.contextmanager
-def killed(process: subprocess.Popen[str]) -> Iterator[None]:
+def killed(process):
     """Leave no process behind, whatever fails."""
     try:
         yield
@@ -32,12 +28,12 @@ def killed(process: subprocess.Popen[str]) -> Iterator[None]:
         process.kill()
 
 
-def test_every_save_is_built_and_a_refusal_leaves_the_last_result(tmp_path: Path) -> None:
+def test_every_save_is_built_and_a_refusal_leaves_the_last_result(tmp_path):
     spec = tmp_path / "mine.toml"
     text = templates()["single-embedded"].read_text("utf-8")
     spec.write_text(text)
     command = [sys.executable, "-P", "-m", "unitcad", "build", "mine.toml", "--watch", "--only", "unit"]
-    lines: queue.Queue[str] = queue.Queue()
+    lines = queue.Queue()
     with (
         subprocess.Popen(
             command,
@@ -52,7 +48,7 @@ def test_every_save_is_built_and_a_refusal_leaves_the_last_result(tmp_path: Path
         stream = process.stdout
         threading.Thread(target=lambda: [lines.put(line) for line in stream], daemon=True).start()
 
-        def until_waiting() -> list[str]:
+        def until_waiting():
             got = []
             while not (got and got[-1].startswith("waiting for a save")):
                 got.append(lines.get(timeout=120))
@@ -73,7 +69,7 @@ def test_every_save_is_built_and_a_refusal_leaves_the_last_result(tmp_path: Path
     assert len(list((tmp_path / "out").glob("*/manifest.json"))) == 2
 
 
-def test_files_that_a_spec_names_are_watched(tmp_path: Path) -> None:
+def test_files_that_a_spec_names_are_watched(tmp_path):
     spec, design = tmp_path / "mine.toml", tmp_path / "mine.py"
     spec.write_text('design = "mine.py:mine"\n')
     design.write_text("a = 1\n")
@@ -85,14 +81,14 @@ def test_files_that_a_spec_names_are_watched(tmp_path: Path) -> None:
     assert time.monotonic() - begun > 0.4
 
 
-def test_a_template_can_not_be_saved() -> None:
+def test_a_template_can_not_be_saved():
     result = CliRunner().invoke(app, ["build", "embedded", "--watch"])
     assert isinstance(result.exception, WrongArgument)
     assert json.dumps("embedded").strip('"') in str(result.exception)
 
 
 @pytest.mark.parametrize("text", ["", "a = [", "design = 3"])
-def test_a_text_that_is_no_spec_is_watched_too(tmp_path: Path, text: str) -> None:
+def test_a_text_that_is_no_spec_is_watched_too(tmp_path, text):
     spec = tmp_path / "mine.toml"
     spec.write_text(text)
     told = wait_for_saves([spec])

@@ -1,11 +1,8 @@
 """What must be true of every unit: no overlap, contact as the design says, closed-form volumes, all within D."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
-from manifold3d import Manifold
 from msgspec.structs import replace
 
 from unitcad.designs.limits import SLOT_CLEARANCE
@@ -16,17 +13,17 @@ NAMES = sorted(templates())
 ROUND = [name for name in NAMES if Variant.of(name).spec.design in ("embedded", "encapsulating")]
 
 
-def _solids(variant: Variant) -> dict[str, Manifold]:
+def _solids(variant):
     return {body.name: variant.mesh(body) for body in variant.unit}
 
 
-def _contact_area(a: Manifold, b: Manifold, hair: float = 1 / 1024) -> float:
+def _contact_area(a, b, hair=1 / 1024):
     """Area of the horizontal contact of a over b: what a, let down by a hair, shares with b, over the hair."""
     return (a.translate((0, 0, -hair)) ^ b).volume() / hair
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_bodies_do_not_overlap_and_fit_the_diameter(name: str) -> None:
+def test_bodies_do_not_overlap_and_fit_the_diameter(name):
     variant = Variant.of(name)
     solids = _solids(variant)
     bodies = list(solids)
@@ -43,7 +40,7 @@ def test_bodies_do_not_overlap_and_fit_the_diameter(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ROUND)
-def test_layer_volumes_have_their_closed_form(name: str) -> None:
+def test_layer_volumes_have_their_closed_form(name):
     """Where no slot cuts them: rings, or a cylinder over a smaller one."""
     data = Variant.of(name).spec
     variant = Variant(replace(data, fpcb=None, wires=None))
@@ -61,7 +58,7 @@ def test_layer_volumes_have_their_closed_form(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in ROUND if Variant.of(n).spec.fpcb])
-def test_the_circuit_touches_what_the_design_says(name: str) -> None:
+def test_the_circuit_touches_what_the_design_says(name):
     variant = Variant.of(name)
     solids = _solids(variant)
     circuit = solids["fpcb"]
@@ -81,7 +78,7 @@ def test_the_circuit_touches_what_the_design_says(name: str) -> None:
     )
 
 
-def test_heights_are_those_of_the_design() -> None:
+def test_heights_are_those_of_the_design():
     heights = {n: Variant.of(n).dimensions for n in ("embedded", "encapsulating")}
     assert heights["embedded"].heights == (2.0, 2.0)
     assert heights["embedded"].cavity_radius == 4.5
@@ -90,7 +87,7 @@ def test_heights_are_those_of_the_design() -> None:
     )
 
 
-def test_fill_closes_the_ring_of_air() -> None:
+def test_fill_closes_the_ring_of_air():
     loose, filled = Variant.of("embedded"), Variant.of("embedded", "motor.fill=true")
     assert loose.dimensions.air_ring == pytest.approx(1.0)
     assert filled.dimensions.air_ring == 0
@@ -103,7 +100,7 @@ def test_fill_closes_the_ring_of_air() -> None:
     assert filled.dimensions.radii == loose.dimensions.radii
 
 
-def test_a_chain_is_symmetric_and_one_tail_is_not() -> None:
+def test_a_chain_is_symmetric_and_one_tail_is_not():
     chain, one = (
         _solids(Variant.of("pass-through"))["fpcb"].bounding_box(),
         _solids(Variant.of("encapsulating"))["fpcb"].bounding_box(),

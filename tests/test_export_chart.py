@@ -1,7 +1,5 @@
 """Charts: well-formed, values at their places on linear and logarithmic axes, the same data the same bytes."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 
@@ -13,7 +11,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.mark.parametrize("log", [False, True])
-def test_a_value_lies_between_the_ticks_round_it(log: bool) -> None:
+def test_a_value_lies_between_the_ticks_round_it(log):
     text = chart([Series("a & b", [1, 10, 100], [3, 30, 50], points=True)], "t", "x", "y <1>", log, log)
     root = ET.fromstring(text)
     labels = {
@@ -31,7 +29,7 @@ def test_a_value_lies_between_the_ticks_round_it(log: bool) -> None:
     assert text == chart([Series("a & b", [1, 10, 100], [3, 30, 50], points=True)], "t", "x", "y <1>", log, log)
 
 
-def test_what_an_axis_can_not_show_is_left_out() -> None:
+def test_what_an_axis_can_not_show_is_left_out():
     text = chart([Series("s", [0, 1, math.nan, 2], [1, 0, 1, 5], points=True)], "t", "x", "y", log_y=True)
     spots = [(float(c.get("cx", "0")), float(c.get("cy", "0"))) for c in ET.fromstring(text).iter(f"{SVG}circle")]
     assert len(spots) == 2 + 2  # two in the legend
@@ -40,7 +38,7 @@ def test_what_an_axis_can_not_show_is_left_out() -> None:
 
 
 @pytest.mark.parametrize(("low", "first"), [(-0.001, "0"), (-0.2, "-5")])
-def test_an_axis_starts_at_zero_unless_values_are_seen_below_it(low: float, first: str) -> None:
+def test_an_axis_starts_at_zero_unless_values_are_seen_below_it(low, first):
     text = chart([Series("a", [0, 1], [low, 20])], "t", "x", "y")
     ticks = [t.text for t in ET.fromstring(text).iter(f"{SVG}text") if t.get("text-anchor") == "end"]
     assert ticks[0] == first

@@ -15,7 +15,7 @@ from unitcad.validation import load
 BODIES = {body.name: body for body in all_bodies()}
 
 
-def measured(vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, float, float]:
+def measured(vertices, faces):
     """By trimesh, another library: watertight volume, signed volume (mm3), least altitude of a face (mm)."""
     mesh = trimesh.Trimesh(vertices.astype(float), faces, process=False)
     sides = np.linalg.norm(np.diff(mesh.triangles[:, (0, 1, 2, 0)], axis=1), axis=2)

@@ -1,9 +1,6 @@
 """Pictures by numpy alone: what covers what, against exact answers; names clear of everything; PNG against Pillow."""
 
-from __future__ import annotations
-
 import io
-from collections.abc import Callable
 from itertools import combinations, product, starmap
 from pathlib import Path
 
@@ -13,8 +10,7 @@ from PIL import Image
 
 from unitcad.export import raster
 from unitcad.export.finding_pictures import common_line
-from unitcad.export.raster import Label, Layer, Surface
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.export.raster import Surface
 from unitcad.pipeline.scenes import exploded_view, unit_cut_open
 from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
@@ -26,17 +22,17 @@ FRONT = np.array([[0, 1, 2], [0, 2, 3]])  # seen from -y anticlockwise
 BLUE, BROWN, CREAM = (0.2, 0.4, 0.6), (0.6, 0.5, 0.4), (0.9, 0.9, 0.7)
 
 
-def view(size: tuple[int, int] = (100, 100), reach: float = 2.0) -> raster.Camera:
+def view(size=(100, 100), reach=2.0):
     return raster.aim((0, -1, 0), np.zeros((1, 3)), size, reach)
 
 
-def drawn(*surfaces: Surface, cut: float = np.inf, wires: bool = False) -> np.ndarray:
+def drawn(*surfaces, cut=np.inf, wires=False):
     """Pixels (height, width, 3), 0 to 255, twice as fine as the view."""
     layers = [raster.render(surface, view(), cut) for surface in surfaces]
     return raster.compose(layers, view(), wires)[0][..., :3].astype(int)
 
 
-def test_a_square_covers_its_pixels_once() -> None:
+def test_a_square_covers_its_pixels_once():
     face, _ = raster.look(SQUARE, FRONT, view())
     covered = face >= 0
     assert covered.sum() == 50 * 50
@@ -44,7 +40,7 @@ def test_a_square_covers_its_pixels_once() -> None:
     assert set(np.unique(face)) == {-1, 0, 1}
 
 
-def test_the_nearer_face_is_seen_and_a_cut_takes_it_away() -> None:
+def test_the_nearer_face_is_seen_and_a_cut_takes_it_away():
     vertices = np.concatenate([SQUARE, SQUARE * 0.52 + [0, -1, 0], SQUARE * 0.52 + [0, 1, 0]])
     faces = np.concatenate([FRONT, FRONT + 4, FRONT + 8])
     face, depth = raster.look(vertices, faces, view())
@@ -56,7 +52,7 @@ def test_the_nearer_face_is_seen_and_a_cut_takes_it_away() -> None:
 
 @pytest.mark.parametrize("towards", [(1, -1.4, 0.9), (0, 0, 1), (0, 0, -1), (-0.1, 1, 0.15)])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_view_keeps_lengths_and_hands(towards: tuple[float, float, float], turned: bool) -> None:
+def test_a_view_keeps_lengths_and_hands(towards, turned):
     camera = raster.aim(towards, np.array([[3.0, 4.0, 5.0]]), (400, 200), 10.0, turned)
     frame = np.stack([camera.right, camera.up, camera.eye])
     assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-12)
@@ -66,7 +62,7 @@ def test_a_view_keeps_lengths_and_hands(towards: tuple[float, float, float], tur
     assert turned == (camera.up[2] < 0 or (camera.up[2] == 0 and camera.up[1] < 0))
 
 
-def test_front_back_and_background_have_their_colours() -> None:
+def test_front_back_and_background_have_their_colours():
     for faces, hue in ((FRONT, BLUE), (FRONT[:, ::-1], BROWN)):
         picture = drawn(Surface(SQUARE, faces, BLUE, inside=BROWN))
         assert picture[0, 0].tolist() == [255, 255, 255]
@@ -80,7 +76,7 @@ def test_front_back_and_background_have_their_colours() -> None:
     }  # fmt: skip
 
 
-def test_lines_run_round_smooth_patches_and_wires_along_all_sides() -> None:
+def test_lines_run_round_smooth_patches_and_wires_along_all_sides():
     bent = np.concatenate([SQUARE, [[3, 1, -1], [3, 1, 1]]])  # a second square behind an edge of 27 degrees
     surface = Surface(bent, np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]), (1.0, 1.0, 1.0))
     plain, wired = drawn(surface).max(axis=2), drawn(surface, wires=True).max(axis=2)
@@ -91,14 +87,14 @@ def test_lines_run_round_smooth_patches_and_wires_along_all_sides() -> None:
     assert wired[100, 99:101].min() == int(lit * raster.WIRE)
 
 
-def test_png_is_what_pillow_reads_back() -> None:
+def test_png_is_what_pillow_reads_back():
     picture = np.random.default_rng(2).integers(0, 256, (37, 53, 3), np.uint8)
     data = raster.encode_png(Image.fromarray(picture))
     assert data == raster.encode_png(Image.fromarray(picture))
     assert np.array_equal(np.array(Image.open(io.BytesIO(data))), picture)
 
 
-def test_the_line_of_two_triangles() -> None:
+def test_the_line_of_two_triangles():
     flat = np.array([[-4, -4, 0], [4, -4, 0], [0, 4, 0]], float)
     upright = np.array([[-1, 0, -1], [1, 0, -1], [0, 0, 3]], float)
     line = common_line(flat, upright)
@@ -108,10 +104,7 @@ def test_the_line_of_two_triangles() -> None:
     assert common_line(flat, upright + np.array([0, 0, 5])) is None
 
 
-Box = tuple[float, float, float, float]
-
-
-def faults(owner: np.ndarray, boxes: dict[int, Box], ends: dict[int, tuple[float, float]]) -> list[str]:
+def faults(owner, boxes, ends):
     """What is wrong with names at `boxes` (left, right, top, bottom) of the layers whose leaders end at `ends`."""
     height, width = owner.shape
     found = []
@@ -138,11 +131,9 @@ SETS = [(name, []) for name in sorted(templates())] + [
 
 @pytest.mark.parametrize("draw", [exploded_view, unit_cut_open])
 @pytest.mark.parametrize(("name", "changes"), SETS)
-def test_names_in_the_pictures_of_all_templates(
-    draw: Callable[[MouldSet], bytes], name: str, changes: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    named: list[tuple[list[Layer], list[str], np.ndarray]] = []
-    placed: list[list[Label]] = []
+def test_names_in_the_pictures_of_all_templates(draw, name, changes, monkeypatch):
+    named = []
+    placed = []
     name_layers, place_names = raster.name_layers, raster.place_names
     monkeypatch.setattr(raster, "name_layers", lambda *a: (named.append(a[:3]), name_layers(*a))[1])
     monkeypatch.setattr(raster, "place_names", lambda *a: (placed.append(place_names(*a)), placed[-1])[1])
@@ -158,7 +149,7 @@ def test_names_in_the_pictures_of_all_templates(
     assert all(one.end for one in written.values())
 
 
-def test_letters_lie_in_their_box_and_any_name_can_be_written() -> None:
+def test_letters_lie_in_their_box_and_any_name_can_be_written():
     """Black pixels of a picture that shows nothing else, where the name's place is known."""
     for text in ("cup 1", "Qgjpqy ÀÖ|", "x" * 99, "mm² 层\n\0"):
         name = raster.Name(text, (0.0, 0.0, 0.0), on=True)

@@ -24,7 +24,7 @@ BODIES = all_bodies()
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory) -> Path:
+def written(tmp_path_factory):
     path = tmp_path_factory.mktemp("step") / "moulds.step"
     step.write(path, BODIES, "moulds")
     return path

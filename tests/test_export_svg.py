@@ -17,12 +17,12 @@ from unitcad.validation import templates
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def area(region: svg.Region) -> float:
+def area(region):
     """Area in mm2, by manifold3d's own even-odd filling."""
     return manifold3d.CrossSection(region.loops, manifold3d.FillRule.EvenOdd).area()
 
 
-def texts(root: ElementTree.Element) -> dict[str, tuple[float, float, float, float]]:
+def texts(root):
     """Text by what it says, with the box that it takes (px)."""
     found = {}
     for index, node in enumerate(root.iter(f"{SVG}text")):
@@ -32,7 +32,7 @@ def texts(root: ElementTree.Element) -> dict[str, tuple[float, float, float, flo
     return found
 
 
-def drawn(template: str) -> str:
+def drawn(template):
     variant = Variant.of(template)
     names = {f"layer{i + 1}": f"layer {i + 1}: {layer.material}" for i, layer in enumerate(variant.spec.layers)}
     bodies = [replace(body, name=names.get(body.name, body.name)) for body in variant.unit]
@@ -77,7 +77,7 @@ def test_regions_are_the_profiles():
     assert area(second) == pytest.approx(2 * (7 * 4.61 - 5.75 * 3.36) - 1.25 * 0.5, abs=0.02)
 
 
-def shared_area(bodies: list[Body], y: float) -> float:
+def shared_area(bodies, y):
     """Area that two bodies claim in the section at y, mm2."""
     one, other = (manifold3d.CrossSection(r.loops, manifold3d.FillRule.EvenOdd) for r in svg.cut(bodies, 96, y))
     return (one ^ other).area()

@@ -28,13 +28,13 @@ def parts():
     ]
 
 
-def model(data: bytes) -> ElementTree.Element:
+def model(data):
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         assert archive.testzip() is None
         return ElementTree.fromstring(archive.read("3D/3dmodel.model"))
 
 
-def placed_boxes(root: ElementTree.Element) -> list[tuple[np.ndarray, np.ndarray]]:
+def placed_boxes(root):
     objects = {o.get("id"): o for o in root.iter(f"{CORE}object")}
     found = []
     for item in root.iter(f"{CORE}item"):
@@ -86,7 +86,7 @@ def test_names_are_escaped(parts):
     assert node.get("name") == 'a<b>"&'
 
 
-def volume(node: ElementTree.Element) -> float:
+def volume(node):
     """Return an object's volume by the divergence theorem, mm3."""
     corners = np.array([[float(v.get(axis, "")) for axis in "xyz"] for v in node.iter(f"{CORE}vertex")])
     faces = [[int(t.get(key, "")) for key in ("v1", "v2", "v3")] for t in node.iter(f"{CORE}triangle")]

@@ -1,7 +1,5 @@
 """Every fault of a spec at once, each with its line; a value that is offered is accepted."""
 
-from __future__ import annotations
-
 import copy
 import json
 import random
@@ -57,26 +55,26 @@ FAULTS = {
 
 
 @pytest.fixture
-def bad(tmp_path: Path) -> Path:
+def bad(tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text(BAD)
     return file
 
 
-def refusal(source: object, changes: object = ()) -> Refusal:
+def refusal(source, changes=()):
     with pytest.raises(Refusal) as refused:
         load(source, changes)  # type: ignore[arg-type]
     return refused.value
 
 
-def test_all_faults_are_listed_with_their_lines(bad: Path) -> None:
+def test_all_faults_are_listed_with_their_lines(bad):
     first = refusal(bad)
     found = [first, *first.others]
     assert {one.field: one.line for one in found} == FAULTS
     assert {one.file for one in found} == {str(bad)}
 
 
-def test_the_command_prints_a_line_a_fault_in_the_order_of_the_file(bad: Path) -> None:
+def test_the_command_prints_a_line_a_fault_in_the_order_of_the_file(bad):
     done = subprocess.run(
         [sys.executable, "-m", "unitcad", "build", str(bad), "--json"], capture_output=True, text=True, cwd=bad.parent
     )
@@ -88,7 +86,7 @@ def test_the_command_prints_a_line_a_fault_in_the_order_of_the_file(bad: Path) -
     assert [path.name for path in bad.parent.iterdir()] == ["bad.toml"]
 
 
-def test_names_are_refused_with_those_that_there_are(bad: Path) -> None:
+def test_names_are_refused_with_those_that_there_are(bad):
     told = {one.field: str(one) for one in (refusal(bad), *refusal(bad).others)}
     assert "closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'" in told["moulds.printer"]
     for name in ("corrected", "divider", "fem", "published", "rule"):
@@ -96,7 +94,7 @@ def test_names_are_refused_with_those_that_there_are(bad: Path) -> None:
     assert "nearest" not in told["estimate.models.0"]
 
 
-def test_what_is_offered_beside_other_faults_is_accepted_once_they_are_gone(bad: Path) -> None:
+def test_what_is_offered_beside_other_faults_is_accepted_once_they_are_gone(bad):
     nearest = {one.field: one.nearest for one in (refusal(bad), *refusal(bad).others)}["diameter_mm"]
     data = tomllib.loads(BAD)
     del data["colour"], data["moulds"], data["estimate"]
@@ -105,14 +103,14 @@ def test_what_is_offered_beside_other_faults_is_accepted_once_they_are_gone(bad:
     assert refusal(data | {"diameter_mm": nearest - 0.01}).field == "diameter_mm"  # type: ignore[operator]
 
 
-def test_a_fault_that_only_follows_from_another_is_not_listed(tmp_path: Path) -> None:
+def test_a_fault_that_only_follows_from_another_is_not_listed(tmp_path):
     """A diameter of 12.2 mm, the least that is accepted, has no room for this tail; one of 14 mm has."""
     data = read("encapsulating")
     data["diameter_mm"] = -3
     assert [one.field for one in (refusal(data), *refusal(data).others)] == ["diameter_mm"]
 
 
-def test_a_value_from_an_option_has_no_line(bad: Path, tmp_path: Path) -> None:
+def test_a_value_from_an_option_has_no_line(bad, tmp_path):
     good = tmp_path / "good.toml"
     good.write_text(templates()["encapsulating"].read_text())
     refused = refusal(good, ["diameter_mm=-3"])
@@ -120,7 +118,7 @@ def test_a_value_from_an_option_has_no_line(bad: Path, tmp_path: Path) -> None:
     assert refused.located == str(refused)
 
 
-def test_a_key_that_is_missing_is_on_the_line_of_its_table(tmp_path: Path) -> None:
+def test_a_key_that_is_missing_is_on_the_line_of_its_table(tmp_path):
     file = tmp_path / "x.toml"
     file.write_text(
         BAD.replace('material = "butter"\n', "").replace("diameter_mm = -3\n", "").replace('"thick"', "1.2")
@@ -132,7 +130,7 @@ def test_a_key_that_is_missing_is_on_the_line_of_its_table(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", templates())
-def test_several_planted_faults_are_all_found(name: str, tmp_path: Path) -> None:
+def test_several_planted_faults_are_all_found(name, tmp_path):
     """Three values out of range, drawn at random: each is listed, and nothing else."""
     planted = {
         "layers.0.wall_mm": -1.0,
@@ -152,7 +150,7 @@ def test_several_planted_faults_are_all_found(name: str, tmp_path: Path) -> None
     assert sorted(one.field for one in (refused, *refused.others)) == sorted(chosen)
 
 
-def test_lines_of_every_value_of_a_file_in_all_its_forms() -> None:
+def test_lines_of_every_value_of_a_file_in_all_its_forms():
     """Against a count by hand of each statement: strings over lines, dotted keys, inline tables, arrays of tables."""
     text = '''# a comment
 a.b = 1
@@ -186,7 +184,7 @@ b"""
     assert line_of(text.replace("\n", "\r\n"), "rows.1.sub.z") == 22
 
 
-def test_at_follows_no_index_beyond_a_list() -> None:
+def test_at_follows_no_index_beyond_a_list():
     data = {"a": [1, {"b": 2}]}
     before = copy.deepcopy(data)
     assert at(data, "a.1.b") == 2
@@ -194,7 +192,7 @@ def test_at_follows_no_index_beyond_a_list() -> None:
     assert data == before
 
 
-def test_init_writes_no_python_and_names_the_schema_that_schema_writes(tmp_path: Path, monkeypatch) -> None:
+def test_init_writes_no_python_and_names_the_schema_that_schema_writes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = CliRunner().invoke
     assert run(app, ["init", "mine"]).exit_code == 0

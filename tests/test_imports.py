@@ -1,7 +1,5 @@
 """The house: imports run downward only, without a circle, and nothing heavy is loaded by what does not need it."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import os
@@ -47,7 +45,7 @@ LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_
 CAD = ("OCP", "build123d", "cadquery")
 
 
-def _edges() -> set[tuple[str, str, str]]:
+def _edges():
     found = set()
     for file in sorted(PACKAGE.rglob("*.py")):
         room = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
@@ -64,19 +62,19 @@ def _edges() -> set[tuple[str, str, str]]:
     return found
 
 
-def test_every_room_has_a_floor() -> None:
+def test_every_room_has_a_floor():
     rooms = {
         p.name.removesuffix(".py") for p in PACKAGE.iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()
     }
     assert rooms - {"__init__", "__main__"} <= set(LEVEL)
 
 
-def test_imports_run_downward_only() -> None:
+def test_imports_run_downward_only():
     upward = [edge for edge in _edges() if LEVEL[edge[0]] >= LEVEL[edge[1]]]
     assert upward == []
 
 
-def test_attenuation_and_check_know_nothing_of_cad() -> None:
+def test_attenuation_and_check_know_nothing_of_cad():
     for room, below, file in _edges():
         if room == "attenuation":
             known = (
@@ -93,13 +91,13 @@ def test_attenuation_and_check_know_nothing_of_cad() -> None:
             assert below in ("workers", "files", "geometry", "text", "errors"), f"{file} imports {below}"
 
 
-def _file_imports(folder: Path) -> dict[str, set[str]]:
+def _file_imports(folder):
     """The files below `folder` and those of them that each imports, at its top or within a function, for types too."""
     names = {file: file.relative_to(PACKAGE).as_posix() for file in folder.rglob("*.py")}
     modules = {f"unitcad.{name[:-3].replace('/', '.')}".removesuffix(".__init__"): name for name in names.values()}
-    graph: dict[str, set[str]] = {}
+    graph = {}
     for file in names:
-        wanted: set[str] = set()
+        wanted = set()
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):
             if isinstance(node, ast.Import):
                 wanted |= {alias.name for alias in node.names}
@@ -110,7 +108,7 @@ def _file_imports(folder: Path) -> dict[str, set[str]]:
     return graph
 
 
-def _circles(graph: dict[str, set[str]]) -> dict[str, set[str]]:
+def _circles(graph):
     """What is left of a graph once all that import nothing, or that nothing imports, are taken away again and again."""
     left, before = dict(graph), None
     while left != before:
@@ -120,7 +118,7 @@ def _circles(graph: dict[str, set[str]]) -> dict[str, set[str]]:
     return left
 
 
-def test_a_test_that_imports_a_room_lies_in_the_room_s_folder() -> None:
+def test_a_test_that_imports_a_room_lies_in_the_room_s_folder():
     """The others are the core's, but for tests/whole, on pages and commands of several rooms; .ci/core runs them."""
     tests = Path(__file__).parent
     imports = re.compile(rf"^\s*(?:from|import) unitcad\.({'|'.join(ROOMS)})\b", re.MULTILINE)
@@ -131,7 +129,7 @@ def test_a_test_that_imports_a_room_lies_in_the_room_s_folder() -> None:
     assert {name: rooms for name, rooms in found.items() if rooms and not name.startswith(apart)} == {}
 
 
-def test_no_files_import_each_other_in_a_circle() -> None:
+def test_no_files_import_each_other_in_a_circle():
     graph = _file_imports(PACKAGE)
     assert len(graph) > 150
     assert graph.keys() >= set().union(*graph.values()) != set()
@@ -139,7 +137,7 @@ def test_no_files_import_each_other_in_a_circle() -> None:
     assert _circles(graph) == {}
 
 
-def test_the_rooms_of_check_import_one_way() -> None:
+def test_the_rooms_of_check_import_one_way():
     """Geometry knows no rules, rules know no files; neither rules, readers nor outputs know what runs them."""
     floors = [
         {"manifest", "baseline"},
@@ -157,14 +155,14 @@ def test_the_rooms_of_check_import_one_way() -> None:
             assert room == "__init__" or level[room] < level[other], f"{file} imports {other}"
 
 
-def _names_of_designs(text: str) -> list[str]:
+def _names_of_designs(text):
     """The words of a file's code, texts and comments that are a shipped design's name, but for docstrings' examples."""
     text = re.sub(r'Examples\n +-+\n.*?"""', lambda match: "\n" * match[0].count("\n"), text, flags=re.DOTALL)
     word = re.compile(rf"(?<![a-z])({'|'.join(shipped())})(?![a-z])", re.IGNORECASE)
     return [f"{line}: {named[0]}" for line, row in enumerate(text.splitlines(), 1) for named in word.finditer(row)]
 
 
-def test_no_design_is_named_outside_its_own_file() -> None:
+def test_no_design_is_named_outside_its_own_file():
     own = {Path(sys.modules[design.layers.__module__].__file__ or "") for design in shipped().values()}
     assert len(own) == len(shipped()) > 0
     named = {file.name: found for file in PACKAGE.rglob("*.py") if (found := _names_of_designs(file.read_text()))}
@@ -175,12 +173,12 @@ def test_no_design_is_named_outside_its_own_file() -> None:
     )
 
 
-def test_every_design_has_a_template_and_one_is_the_default() -> None:
+def test_every_design_has_a_template_and_one_is_the_default():
     assert templates().keys() >= shipped().keys()
     assert [name for name, design in shipped().items() if design.default] == [default_template()]
 
 
-def test_no_piece_is_recognised_by_its_name() -> None:
+def test_no_piece_is_recognised_by_its_name():
     kinds = ("base", "cup", "lid", "tongue", "filament", "blade", "layer", "wire", "motor")
     found = []
     for file in PACKAGE.rglob("*.py"):
@@ -203,7 +201,7 @@ def test_no_piece_is_recognised_by_its_name() -> None:
     ],
     ids=lambda run: run[0],
 )
-def test_nothing_needless_is_loaded(run: list[str], tmp_path: Path) -> None:
+def test_nothing_needless_is_loaded(run, tmp_path):
     needless = (*CAD, *(f"unitcad.{room}" for room in ROOMS))
     corners = ["0 0 0", "9 0 0", "0 9 0", "0 0 9"]
     facets = [
@@ -232,7 +230,7 @@ def test_nothing_needless_is_loaded(run: list[str], tmp_path: Path) -> None:
     assert done.stderr.splitlines()[-1] == "[]", done.stderr
 
 
-def test_importing_reads_no_file_of_ours() -> None:
+def test_importing_reads_no_file_of_ours():
     code = (
         "import sys, builtins, io\n"
         "opened = []\n"
@@ -244,12 +242,12 @@ def test_importing_reads_no_file_of_ours() -> None:
 
 
 @pytest.mark.parametrize("gone", [*({room} for room in ROOMS), set(ROOMS)], ids=lambda gone: "-".join(sorted(gone)))
-def test_a_room_can_be_deleted(gone: set[str], tmp_path: Path) -> None:
+def test_a_room_can_be_deleted(gone, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(PACKAGE, copy / "unitcad", ignore=shutil.ignore_patterns("*.pyc.*", *gone))
     shutil.copytree(templates()["embedded"].parent, copy / "templates")
 
-    def run(*words: str, code: tuple[str, ...] = ("-m", "unitcad")) -> str:
+    def run(*words, code=("-m", "unitcad")):
         done = subprocess.run(
             [sys.executable, *code, *words],
             cwd=tmp_path,
@@ -273,7 +271,7 @@ def test_a_room_can_be_deleted(gone: set[str], tmp_path: Path) -> None:
     run(*run("list").split(), code=("-c", each))
 
 
-def test_the_core_needs_no_extra() -> None:
+def test_the_core_needs_no_extra():
     """Every public name, and the module of every command, loads without the packages of the extras."""
     extras = ("build123d", "cadquery", "OCP", "skfem", "threadpoolctl", "libdlf", "pyuff", "nptdms", "h5py", "ezdxf")
     extras += ("starlette", "uvicorn", "tomlkit", "distributed", "dask", "fsspec", "s3fs", "pyarrow")

@@ -1,7 +1,5 @@
 """The command that a missing extra's message gives, by the place that the installation came from."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
@@ -17,8 +15,8 @@ from unitcad.errors import install_command
 
 
 @pytest.fixture
-def installed_from(monkeypatch: pytest.MonkeyPatch):
-    def set_source(source: dict | None) -> list[str]:
+def installed_from(monkeypatch):
+    def set_source(source):
         text = None if source is None else json.dumps(source)
         monkeypatch.setattr(metadata, "distribution", lambda name: SimpleNamespace(read_text=lambda file: text))
         return shlex.split(install_command("lab"))
@@ -26,7 +24,7 @@ def installed_from(monkeypatch: pytest.MonkeyPatch):
     return set_source
 
 
-def test_a_clones_command_names_its_folder_and_its_constraints(installed_from, tmp_path: Path) -> None:
+def test_a_clones_command_names_its_folder_and_its_constraints(installed_from, tmp_path):
     folder = tmp_path / "a clone"
     folder.mkdir()
     (folder / "pyproject.toml").touch()
@@ -38,7 +36,7 @@ def test_a_clones_command_names_its_folder_and_its_constraints(installed_from, t
     assert installed_from(editable) == [*pip, "-e", f"{folder}[lab]"]
 
 
-def test_an_address_is_installed_from_again(installed_from) -> None:
+def test_an_address_is_installed_from_again(installed_from):
     vcs = {
         "url": "https://git.example/unitcad",
         "vcs_info": {"vcs": "git", "commit_id": "abc", "requested_revision": "v1"},
@@ -48,7 +46,7 @@ def test_an_address_is_installed_from_again(installed_from) -> None:
     assert installed_from(archive)[-1] == "unitcad[lab] @ https://git.example/unitcad-1.whl"
 
 
-def test_every_command_to_install_comes_from_the_one_function() -> None:
+def test_every_command_to_install_comes_from_the_one_function():
     """Messages that spell one fail where the package came from elsewhere."""
     package = Path(errors.__file__).parent
     spelled = {
@@ -59,13 +57,13 @@ def test_every_command_to_install_comes_from_the_one_function() -> None:
     assert spelled == {"errors.py"}
 
 
-def test_a_folder_that_is_gone_is_a_clone_to_be_found(installed_from, tmp_path: Path) -> None:
+def test_a_folder_that_is_gone_is_a_clone_to_be_found(installed_from, tmp_path):
     gone = {"url": (tmp_path / "gone").as_uri(), "dir_info": {}}
     assert installed_from(gone)[:3] == ["in", "a", "clone,"]
     assert installed_from(gone)[-1] == ".[lab]"
 
 
-def test_an_environment_without_pip_uses_uv(installed_from, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_environment_without_pip_uses_uv(installed_from, monkeypatch):
     monkeypatch.setattr(util, "find_spec", lambda name: None)
     source = {"url": "https://git.example/unitcad-1.whl", "archive_info": {}}
     command = ["uv", "pip", "install", "--python", sys.executable]

@@ -77,12 +77,12 @@ def test_a_default_build_leaves_step_out_where_no_kernel_is(monkeypatch):
     assert load("embedded").output.formats == ("step", "stl", "3mf")
 
 
-def test_show_uses_the_viewer_that_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown: list[tuple[tuple, dict]] = []
+def test_show_uses_the_viewer_that_is_installed(monkeypatch):
+    shown = []
     viewer = SimpleNamespace(show=lambda *objects, **options: shown.append((objects, options)))
     variant = unitcad.Variant.of("embedded")
     names = list(variant.bodies)
-    installed: set[str] = set()
+    installed = set()
     monkeypatch.setattr("unitcad.kernels.build123d.find_spec", lambda name: name in installed or None)
     with pytest.raises(UnitcadError, match=r"no viewer is installed: .* install ocp-vscode"):
         variant.show()

@@ -1,7 +1,5 @@
 """The page of licences has every dependency of pyproject.toml, and nothing that they need has the GPL."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib import metadata
@@ -12,13 +10,13 @@ LGPL = {"nptdms", "casadi"}
 NOT_SHIPPED = ("all", "dev", "docs", "test")
 
 
-def _name(requirement: str) -> str:
+def _name(requirement):
     found = re.match(r"[A-Za-z0-9_.-]+", requirement)
     assert found
     return found[0]
 
 
-def _direct() -> list[tuple[str, str]]:
+def _direct():
     """Return each dependency with its extra."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     extras = {"": project["dependencies"], **project["optional-dependencies"]}
@@ -30,12 +28,12 @@ def _direct() -> list[tuple[str, str]]:
     ]
 
 
-def test_the_page_has_every_dependency() -> None:
+def test_the_page_has_every_dependency():
     rows = re.findall(r"(?m)^\| (\S*) ?\| (\S+) \| (.+) \|$", (ROOT / "docs/reference/licences.md").read_text("utf-8"))
     assert [(extra, package) for extra, package, _ in rows if package not in ("package", "---")] == _direct()
 
 
-def test_no_dependency_has_the_gpl() -> None:
+def test_no_dependency_has_the_gpl():
     todo, seen = [name for _, name in _direct()], set()
     while todo:
         name = todo.pop().lower().replace("_", "-")

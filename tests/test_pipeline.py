@@ -1,7 +1,5 @@
 """build: files, bytes, folders, interruption, what was left out."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -38,7 +36,7 @@ NAMES = sorted(templates())
 PACKAGE = str(Path(unitcad.__file__).parent)
 
 
-def _tree(folder: Path) -> dict[str, str]:
+def _tree(folder):
     return {
         str(f.relative_to(folder)): hashlib.sha256(f.read_bytes()).hexdigest()
         for f in sorted(folder.rglob("*"))
@@ -46,12 +44,12 @@ def _tree(folder: Path) -> dict[str, str]:
     }
 
 
-def _mesh_only(name: str, *more: str):
+def _mesh_only(name, *more):
     return load(name, ['output.formats=["stl","3mf"]', *more])
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_template_builds_and_passes_all_checks(name: str, tmp_path: Path) -> None:
+def test_every_template_builds_and_passes_all_checks(name, tmp_path):
     built = build(_mesh_only(name), tmp_path)
     assert built.ok
     assert built.manifest["check"]["findings"] == []
@@ -82,7 +80,7 @@ def test_every_template_builds_and_passes_all_checks(name: str, tmp_path: Path) 
         )
 
 
-def test_the_same_spec_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_the_same_spec_gives_the_same_bytes(tmp_path):
     first = build(_mesh_only("pass-through"), tmp_path / "a")
     code = (
         "from unitcad.pipeline.write import build; from unitcad.validation import load; from pathlib import Path;"
@@ -93,7 +91,7 @@ def test_the_same_spec_gives_the_same_bytes(tmp_path: Path) -> None:
     assert _tree(first.folder) == _tree(second)
 
 
-def test_further_formats_are_added_and_none_removed(tmp_path: Path) -> None:
+def test_further_formats_are_added_and_none_removed(tmp_path):
     spec = load("single-embedded", ['output.formats=["stl"]'])
     first = build(spec, tmp_path, only=["unit"])
     (first.folder / "note.txt").write_text("mine")
@@ -105,7 +103,7 @@ def test_further_formats_are_added_and_none_removed(tmp_path: Path) -> None:
     assert second.manifest["outputs"] == ["unit", "moulds"]
 
 
-def test_the_folder_name_ignores_name_and_formats_only() -> None:
+def test_the_folder_name_ignores_name_and_formats_only():
     spec = load("embedded")
     digits = folder_name(spec)[-12:]
     assert folder_name(load("embedded", ["name='An other: name'"])) == f"an-other-name-{digits}"
@@ -115,7 +113,7 @@ def test_the_folder_name_ignores_name_and_formats_only() -> None:
     assert folder_name(load("embedded", ["name='é<>'"])).startswith(("e-", "unit-"))
 
 
-def test_a_folder_of_another_spec_is_an_error_and_stays(tmp_path: Path) -> None:
+def test_a_folder_of_another_spec_is_an_error_and_stays(tmp_path):
     spec = load("single-embedded", ['output.formats=["stl"]'])
     folder = build(spec, tmp_path, only=["unit"]).folder
     other = load("single-embedded", ["layers.0.wall_mm=2.4"])
@@ -132,7 +130,7 @@ def test_a_folder_of_another_spec_is_an_error_and_stays(tmp_path: Path) -> None:
     assert _tree(folder) == before
 
 
-def test_an_interrupted_build_leaves_the_old_result_whole(tmp_path: Path) -> None:
+def test_an_interrupted_build_leaves_the_old_result_whole(tmp_path):
     spec = load("single-embedded", ['output.formats=["stl"]'])
     folder = build(spec, tmp_path, only=["unit"]).folder
     before = _tree(folder)
@@ -144,7 +142,7 @@ def test_an_interrupted_build_leaves_the_old_result_whole(tmp_path: Path) -> Non
     assert [p.name for p in tmp_path.iterdir()] == [folder.name]
 
 
-def test_a_killed_process_leaves_the_old_result_whole(tmp_path: Path) -> None:
+def test_a_killed_process_leaves_the_old_result_whole(tmp_path):
     spec = load("single-embedded", ['output.formats=["stl"]'])
     folder = build(spec, tmp_path, only=["unit"]).folder
     before = _tree(folder)
@@ -164,7 +162,7 @@ def test_a_killed_process_leaves_the_old_result_whole(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == [folder.name]
 
 
-def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tmp_path: Path) -> None:
+def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tmp_path):
     spec = load("single-embedded", ['output.formats=["stl"]'])
     folder = build(spec, tmp_path, only=["unit"]).folder
     before = _tree(folder)
@@ -195,13 +193,13 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
         ("embedded", "boundary representation"),
     ],
 )
-def test_what_a_variant_lacks_is_left_out_and_listed(name: str, what: str, tmp_path: Path) -> None:
+def test_what_a_variant_lacks_is_left_out_and_listed(name, what, tmp_path):
     built = build(load(name, ['output.formats=["stl"]']), tmp_path, only=["unit", "moulds"], check=False)
     assert what in {entry["output"] for entry in built.manifest["skipped"]}
     assert all(entry["reason"] for entry in built.manifest["skipped"])
 
 
-def test_materials_share_geometry() -> None:
+def test_materials_share_geometry():
     soft = Variant.of("encapsulating")
     other = Variant.of("encapsulating", "layers.1.material='ecoflex-00-50'")
     assert soft.plan.label == other.plan.label
@@ -209,7 +207,7 @@ def test_materials_share_geometry() -> None:
     assert Variant.of("encapsulating", "diameter_mm=14.2").plan.label != soft.plan.label
 
 
-def test_json_is_one_object_and_the_last_line_is_the_folder(tmp_path: Path) -> None:
+def test_json_is_one_object_and_the_last_line_is_the_folder(tmp_path):
     command = [sys.executable, "-m", "unitcad", "build", "single-embedded", "--formats", "stl", "--only", "unit"]
     done = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=True)
     assert Path(done.stdout.splitlines()[-1]).is_dir()
@@ -225,7 +223,7 @@ def test_json_is_one_object_and_the_last_line_is_the_folder(tmp_path: Path) -> N
     assert "Traceback" not in refused.stderr
 
 
-def test_ctrl_c_stops_without_a_traceback(tmp_path: Path) -> None:
+def test_ctrl_c_stops_without_a_traceback(tmp_path):
     child = subprocess.Popen(
         [sys.executable, "-m", "unitcad", "build", *NAMES, "--formats", "stl", "-o", str(tmp_path)],
         stdout=subprocess.PIPE,

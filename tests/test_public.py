@@ -1,7 +1,5 @@
 """What `import unitcad` offers: lazily, typed, documented, short to print, and with a file's sentences."""
 
-from __future__ import annotations
-
 import base64
 import doctest
 import inspect
@@ -10,10 +8,8 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import manifold3d
 import numpy as np
@@ -29,14 +25,14 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.raw import RawSpec
 
 PACKAGE = Path(unitcad.__file__).parent
-LAYERS: list[dict[str, Any]] = [
+LAYERS = [
     {"material": "ecoflex-00-10", "wall_mm": 1.25, "cap_mm": 1.0},
     {"material": "dragon-skin-30", "wall_mm": 1.25, "cap_mm": 1.0},
 ]
-UNIT: dict[str, Any] = {"name": "unit", "design": "encapsulating", "diameter_mm": 14.0, "layers": LAYERS}
+UNIT = {"name": "unit", "design": "encapsulating", "diameter_mm": 14.0, "layers": LAYERS}
 
 
-def _run(code: str) -> str:
+def _run(code):
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
@@ -47,14 +43,14 @@ PUBLIC = {f"unitcad.{name}": getattr(unitcad, name) for name in unitcad.__all__}
 }
 
 
-def _sections(text: str) -> dict[str, str]:
+def _sections(text):
     """The sections of a numpydoc docstring by title."""
     parts = re.split(r"(?m)^(\w[\w ]*)\n-+\n", inspect.cleandoc(text))
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_a_public_name_is_documented_with_an_example_that_runs(name: str) -> None:
+def test_a_public_name_is_documented_with_an_example_that_runs(name):
     value = PUBLIC[name]
     sections = _sections(value.__doc__)
     assert ">>> " in sections["Examples"]
@@ -74,36 +70,36 @@ def test_a_public_name_is_documented_with_an_example_that_runs(name: str) -> Non
     assert not runner.failures
 
 
-def test_an_undocumented_parameter_is_seen() -> None:
+def test_an_undocumented_parameter_is_seen():
     assert _sections("Do it.\n\nParameters\n----------\na : int\n    Number.\n")["Parameters"].startswith("a : int")
     with pytest.raises(KeyError):
         _sections("Do it.")["Examples"]
 
 
-def test_importing_loads_nothing() -> None:
+def test_importing_loads_nothing():
     code = "import sys\nbefore = set(sys.modules)\nimport unitcad\n"
     loaded = _run(f"{code}print(*sorted({{m.split('.')[0] for m in set(sys.modules) - before}}))").split()
     assert set(loaded) - sys.stdlib_module_names == {"unitcad"}
 
 
-def test_listing_the_names_loads_nothing() -> None:
+def test_listing_the_names_loads_nothing():
     code = "import sys, unitcad\nnames = dir(unitcad)\nassert 'Spec' in names and 'build' in names\n"
     assert _run(f"{code}print([m for m in sys.modules if m.startswith('unitcad.')])") == "[]"
 
 
 @pytest.mark.parametrize("use", ["unitcad.Spec", "unitcad.Layer", "unitcad.materials()"])
-def test_what_is_data_needs_no_numpy(use: str) -> None:
+def test_what_is_data_needs_no_numpy(use):
     heavy = ("numpy", "scipy", "manifold3d", "trimesh", "OCP")
     assert _run(f"import sys, unitcad\n{use}\nprint([m for m in {heavy} if m in sys.modules])") == "[]"
 
 
-def test_loading_a_spec_needs_no_cad() -> None:
+def test_loading_a_spec_needs_no_cad():
     heavy = ("scipy", "trimesh", "OCP")
     code = "import sys, unitcad\nunitcad.load('encapsulating')\n"
     assert _run(f"{code}print([m for m in {heavy} if m in sys.modules])") == "[]"
 
 
-def test_names_places_and_types_agree() -> None:
+def test_names_places_and_types_agree():
     text = Path(unitcad.__file__).read_text("utf-8")
     typed = text.partition("if TYPE_CHECKING:")[2].partition("__version__")[0]
     names = [line.rpartition(" as ")[2] for line in typed.splitlines() if " as " in line]
@@ -113,14 +109,14 @@ def test_names_places_and_types_agree() -> None:
 
 
 @pytest.mark.parametrize("name", unitcad.__all__)
-def test_every_name_resolves_and_has_a_docstring(name: str) -> None:
+def test_every_name_resolves_and_has_a_docstring(name):
     found = getattr(unitcad, name)
     assert inspect.getdoc(found)
     assert getattr(unitcad, name) is found
 
 
 @pytest.mark.parametrize("name", ["build", "estimate", "check", "load", "materials", "motors", "printers"])
-def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
+def test_functions_say_what_they_raise_and_in_which_units(name):
     found = getattr(unitcad, name)
     text = inspect.getdoc(found.__call__ if inspect.ismodule(found) else found) or ""
     assert "aises" in text, name
@@ -129,7 +125,7 @@ def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
     assert inspect.signature(found).parameters
 
 
-def test_signatures_are_those_of_a_file() -> None:
+def test_signatures_are_those_of_a_file():
     keys = inspect.signature(unitcad.Spec).parameters
     assert list(keys) == list(RawSpec.__struct_fields__)
     required = [name for name, key in keys.items() if key.default is key.empty]
@@ -137,13 +133,13 @@ def test_signatures_are_those_of_a_file() -> None:
     assert list(inspect.signature(unitcad.check).parameters)[:2] == ["files", "printer"]
 
 
-def test_the_typed_material_is_the_one_that_a_spec_takes() -> None:
+def test_the_typed_material_is_the_one_that_a_spec_takes():
     text = inspect.getsource(entries).partition("class MaterialEntry")[2].partition("class MotorEntry")[0]
     typed = [line.split(":")[0].strip() for line in text.splitlines() if "= None" in line]
     assert typed == list(unitcad.Material.__struct_fields__)
 
 
-def test_strict_typing_is_asked_for() -> None:
+def test_strict_typing_is_asked_for():
     assert (PACKAGE / "py.typed").is_file()
     for module, _, _ in {place.partition(":") for place in unitcad._PLACES.values()}:
         file = PACKAGE / (module.replace(".", "/") + ".py")
@@ -157,7 +153,7 @@ def test_strict_typing_is_asked_for() -> None:
     )
 
 
-def test_what_is_typed_runs(tmp_path: Path) -> None:
+def test_what_is_typed_runs(tmp_path):
     assert typed_use.silicones()["ecoflex-00-10"] == 1.04
     volume, first, level = typed_use.use(tmp_path)
     assert volume > 0
@@ -166,7 +162,7 @@ def test_what_is_typed_runs(tmp_path: Path) -> None:
     assert 0 < level < 1
 
 
-BAD: list[dict[str, Any]] = [
+BAD = [
     {"diameter_mm": "wide"},
     {"diameter_mm": 3.0},
     {"diameter_mm": float("inf")},
@@ -189,7 +185,7 @@ BAD: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("wrong", BAD, ids=lambda wrong: json.dumps(wrong)[:40])
-def test_a_spec_is_refused_with_the_sentence_of_its_file(wrong: dict[str, Any], tmp_path: Path) -> None:
+def test_a_spec_is_refused_with_the_sentence_of_its_file(wrong, tmp_path):
     data = {**UNIT, **wrong}
     file = tmp_path / "unit.toml"
     file.write_text(tomli_w.dumps(data), "utf-8")
@@ -207,19 +203,19 @@ def test_a_spec_is_refused_with_the_sentence_of_its_file(wrong: dict[str, Any], 
 
 
 @pytest.mark.parametrize("missing", UNIT)
-def test_a_missing_key_is_refused_as_in_a_file(missing: str) -> None:
+def test_a_missing_key_is_refused_as_in_a_file(missing):
     data = {key: value for key, value in UNIT.items() if key != missing}
     with pytest.raises(Refusal, match=f"^{missing}: is required$"):
         unitcad.Spec(**data)
 
 
 @pytest.mark.parametrize("wrong", [object(), 1j, np.ones(3), {1, 2}, b"wide"], ids=lambda wrong: type(wrong).__name__)
-def test_what_no_file_holds_is_refused_with_its_field(wrong: Any) -> None:
+def test_what_no_file_holds_is_refused_with_its_field(wrong):
     with pytest.raises(Refusal, match=r"^diameter_mm: takes no"):
         unitcad.Spec(**{**UNIT, "diameter_mm": wrong})
 
 
-def test_a_spec_of_classes_is_that_of_the_file(tmp_path: Path) -> None:
+def test_a_spec_of_classes_is_that_of_the_file(tmp_path):
     typed = typed_use.typed_spec()
     data = {
         "name": "typed",
@@ -238,7 +234,7 @@ def test_a_spec_of_classes_is_that_of_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "embedded"])
-def test_a_changed_spec_is_the_changed_file(name: str) -> None:
+def test_a_changed_spec_is_the_changed_file(name):
     for change in ({"diameter_mm": 16.0}, {"moulds.printer": "sla"}, {"motor.fill": True}, {"fpcb.tail_width_mm": 3.5}):
         assert unitcad.load(unitcad.load(name), set=change) == unitcad.load(name, set=change)
     assert unitcad.load(name, set="diameter_mm=16") == unitcad.load(name, set={"diameter_mm": np.float64(16)})
@@ -247,12 +243,12 @@ def test_a_changed_spec_is_the_changed_file(name: str) -> None:
     assert changed.moulds.bed_x_mm == 150.0
 
 
-def test_a_spec_is_frozen() -> None:
+def test_a_spec_is_frozen():
     with pytest.raises(AttributeError):
         unitcad.load("encapsulating").diameter_mm = 15.0  # type: ignore[misc]
 
 
-def test_meshes_are_handed_out_in_both_libraries() -> None:
+def test_meshes_are_handed_out_in_both_libraries():
     variant = unitcad.Variant(unitcad.Spec(**UNIT))
     solid, mesh = variant.mesh("layer1"), variant.mesh("layer1", "trimesh")
     assert isinstance(solid, manifold3d.Manifold)
@@ -273,21 +269,21 @@ def test_meshes_are_handed_out_in_both_libraries() -> None:
 class _Tags(HTMLParser):
     """Start tags and attributes; raises for an end tag that ends nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.open, self.seen, self.images = list[str](), set[str](), list[str]()
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.seen |= {tag, *(name for name, _ in attrs)}
         self.images += [value or "" for name, value in attrs if name == "src"]
         if tag != "img":
             self.open.append(tag)
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
 
-def _shown(tmp_path: Path) -> list[Any]:
+def _shown(tmp_path):
     hostile = {**UNIT, "name": "<script>alert(1)</script>&" + "long" * 22}
     spec = unitcad.Spec(**hostile)
     good, bad = tmp_path / "<b>good.stl", tmp_path / "bad.stl"
@@ -302,7 +298,7 @@ def _shown(tmp_path: Path) -> list[Any]:
     ]
 
 
-def check_shown(value: Any) -> None:
+def check_shown(value):
     """Check that a result is short to print, and that its table is whole and holds no script."""
     assert len(repr(value)) <= 200
     assert "\n" not in repr(value)
@@ -320,7 +316,7 @@ def check_shown(value: Any) -> None:
         assert "<script" not in svg
 
 
-def test_reprs_are_short_and_html_holds_no_script(tmp_path: Path) -> None:
+def test_reprs_are_short_and_html_holds_no_script(tmp_path):
     for value in _shown(tmp_path):
         check_shown(value)
     assert repr(unitcad.load("encapsulating")) == (
@@ -328,7 +324,7 @@ def test_reprs_are_short_and_html_holds_no_script(tmp_path: Path) -> None:
     )
 
 
-def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
+def test_arguments_that_can_not_be_are_refused(tmp_path):
     with pytest.raises(Refusal, match="printer = 'fdm': unknown name"):
         unitcad.check("a.stl", printer="fdm")
     with pytest.raises(Refusal, match="unit = 'yard': unknown name"):
@@ -367,20 +363,18 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         (lambda: unitcad.check("a.stl", ignore=3), "^ignore = 3: takes a text or"),  # type: ignore[arg-type]
     ],
 )
-def test_arguments_of_another_type_are_refused_in_one_sentence(
-    call: Callable[[], object], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_arguments_of_another_type_are_refused_in_one_sentence(call, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UnitcadError, match=words):
         call()
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_single_text_is_a_list_of_one(tmp_path: Path) -> None:
+def test_a_single_text_is_a_list_of_one(tmp_path):
     built = unitcad.build("encapsulating", tmp_path, formats="stl", only="unit", check=False)
     assert list(built.volumes) == ["layer1", "layer2", "motor", "fpcb"]
     assert list(unitcad.estimate("encapsulating", models="published").edge) == ["published"]
 
 
-def test_tab_completion_offers_the_public_names_alone() -> None:
+def test_tab_completion_offers_the_public_names_alone():
     assert [name for name in dir(unitcad) if not name.startswith("__")] == unitcad.__all__

@@ -1,12 +1,9 @@
 """The same input gives the same bytes, whatever order Python's sets have in a process."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -19,7 +16,7 @@ QUICK = ["encapsulating", *(names[0] for names in BUILT[1:])]
 ALL = [name for names in BUILT for name in names]
 
 
-def built(name: str, seed: int, folder: Path) -> dict[str, str]:
+def built(name, seed, folder):
     """Build everything of a template in a process; return the hash of each file."""
     command = [sys.executable, "-m", "unitcad", "build", name, "-o", str(folder), "--formats", "step,stl,3mf,svg,glb"]
     environment = {**os.environ, "PYTHONHASHSEED": str(seed), "SOURCE_DATE_EPOCH": "1700000000"}
@@ -35,6 +32,6 @@ def built(name: str, seed: int, folder: Path) -> dict[str, str]:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.long]) for name in ALL]
 )
-def test_two_processes_write_the_same_bytes(name: str, tmp_path: Path) -> None:
+def test_two_processes_write_the_same_bytes(name, tmp_path):
     first, second = (built(name, seed, tmp_path / str(seed)) for seed in (1, 4))
     assert first == second

@@ -1,7 +1,5 @@
 """The gap between plane sections: exact lengths, and other ways to the same number."""
 
-from __future__ import annotations
-
 import math
 import random
 
@@ -13,11 +11,11 @@ from unitcad.geometry.segments import between_convex, between_outlines
 from unitcad.kernels.mesh import gap
 
 
-def square(half: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:
+def square(half, x=0.0, y=0.0):
     return np.array([(-half, -half), (half, -half), (half, half), (-half, half)]) + np.array((x, y))
 
 
-def star(pick: random.Random, x: float, y: float) -> np.ndarray:
+def star(pick, x, y):
     """A polygon of seven to sixty corners, two to five from its middle."""
     angles = np.linspace(0, 2 * math.pi, pick.randint(7, 60), endpoint=False)
     radii = np.array([pick.uniform(2, 5) for _ in angles])
@@ -27,17 +25,17 @@ def star(pick: random.Random, x: float, y: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("x", "y", "least"), [(5.0, 0.0, 3.0), (5.0, 6.0, 5.0), (2.0, 0.5, 0.0), (100.0, 0.0, 9.0)], ids=str
 )
-def test_the_gap_of_two_squares(x: float, y: float, least: float) -> None:
+def test_the_gap_of_two_squares(x, y, least):
     """Side to side, corner to corner, touching, and farther than is looked for."""
     assert between_outlines([square(1)], [square(1, x, y)], 9.0) == pytest.approx(least, abs=1e-12)
 
 
-def test_a_side_counts_between_its_ends_and_so_does_a_hole() -> None:
+def test_a_side_counts_between_its_ends_and_so_does_a_hole():
     frame = CrossSection([square(9), square(5)[::-1]])
     assert gap(CrossSection([square(1, 0.25, 2)]), frame, 9.0) == pytest.approx(2.0, abs=1e-9)
 
 
-def test_what_overlaps_or_lies_inside_has_no_gap() -> None:
+def test_what_overlaps_or_lies_inside_has_no_gap():
     whole = CrossSection([square(9)])
     for x in (0, 8.9):
         assert gap(whole, CrossSection([square(1, x)]), 5.0) == 0.0
@@ -45,7 +43,7 @@ def test_what_overlaps_or_lies_inside_has_no_gap() -> None:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_gap_is_that_of_prisms_and_of_convex_outlines(seed: int) -> None:
+def test_the_gap_is_that_of_prisms_and_of_convex_outlines(seed):
     pick = random.Random(seed)
     one, other = star(pick, 0, 0), star(pick, pick.uniform(4, 14), pick.uniform(-9, 9))
     sections = CrossSection([one]), CrossSection([other])

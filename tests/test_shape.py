@@ -1,7 +1,5 @@
 """Profiles and trees: refusals, closed forms, hashes."""
 
-from __future__ import annotations
-
 import math
 import pickle
 import subprocess
@@ -34,7 +32,6 @@ from unitcad.shape import (
     union,
 )
 from unitcad.shape.lettering import CHARACTERS, engraving
-from unitcad.shape.tree import Turn
 
 lengths = st.floats(0.25, 50).map(mm)
 
@@ -50,36 +47,36 @@ lengths = st.floats(0.25, 50).map(mm)
         ((0, 3), (-2, -3), (3, 1), (-3, 1), (2, -3)),  # a pentagram: it only turns left, but twice round
     ],
 )
-def test_a_profile_that_bounds_no_area_is_refused(corners: tuple) -> None:
+def test_a_profile_that_bounds_no_area_is_refused(corners):
     with pytest.raises(ProfileError):
         polygon(*corners)
 
 
-def test_a_revolved_profile_stays_off_the_far_side_of_the_axis() -> None:
+def test_a_revolved_profile_stays_off_the_far_side_of_the_axis():
     with pytest.raises(ProfileError, match="axis"):
         Revolve(rectangle(-1, 0, 2, 1))
 
 
-def test_lengths_lie_on_the_grid_and_sums_are_exact() -> None:
+def test_lengths_lie_on_the_grid_and_sums_are_exact():
     assert mm(0.1) * 1024 == round(0.1 * 1024)
     assert mm(1.25) + mm(2.11) == mm(mm(1.25) + mm(2.11))
     assert rectangle(0, 0, 0.1, 1).vertices[1][0] == mm(0.1)
 
 
 @given(lengths, lengths, lengths)
-def test_revolved_volumes_have_a_closed_form(r: float, width: float, height: float) -> None:
+def test_revolved_volumes_have_a_closed_form(r, width, height):
     assert exact_volume(ring(r, r + width, 0, height)) == pytest.approx(
         math.pi * ((r + width) ** 2 - r**2) * height, rel=1e-12
     )
 
 
 @given(st.floats(0.2, 20), st.integers(24, 200).map(lambda n: 8 * (n // 8)))
-def test_area_true_polygons_keep_a_cylinders_volume(radius: float, segments: int) -> None:
+def test_area_true_polygons_keep_a_cylinders_volume(radius, segments):
     body = cylinder(radius, 0, 2)
     assert realise(body, segments).volume() == pytest.approx(exact_volume(body), rel=1e-9)
 
 
-def test_an_arc_revolved_is_a_sphere_and_a_torus() -> None:
+def test_an_arc_revolved_is_a_sphere_and_a_torus():
     quarter = math.tan(math.pi / 8)
     ball = Revolve(Profile(((0, -2, quarter), (2, 0, quarter), (0, 2, 0))))
     assert exact_volume(ball) == pytest.approx(4 / 3 * math.pi * 8, rel=1e-12)
@@ -88,14 +85,14 @@ def test_an_arc_revolved_is_a_sphere_and_a_torus() -> None:
     assert torus.profile.bounds == pytest.approx((4, -1, 6, 1))
 
 
-def test_a_taper_has_the_volume_of_its_frustum() -> None:
+def test_a_taper_has_the_volume_of_its_frustum():
     below, above = rectangle(-2, -2, 2, 2), rectangle(-1, -1, 1, 1)
     frustum = Extrude(below, 0, 3, top=above)
     assert exact_volume(frustum) == pytest.approx(3 / 3 * (16 + 4 + 8), rel=1e-12)
     assert realise(frustum, 32).volume() == pytest.approx(28, rel=1e-12)
 
 
-def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not() -> None:
+def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not():
     tree = cut(union((ring(1, 2, 0, 1), moved(box(0, 1, 0, 1, 0, 1), x=3))), [turned(cylinder(0.5, 0, 2), "x", 1)])
     code = (
         "from unitcad.shape import *;"
@@ -109,7 +106,7 @@ def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not() -> 
     assert content_hash(union((tree,))) == content_hash(tree)
 
 
-def test_turns_by_any_angle_are_rotations_and_opposite_ones_mirror_each_other() -> None:
+def test_turns_by_any_angle_are_rotations_and_opposite_ones_mirror_each_other():
     rod = box(2, 3, -0.25, 0.25, 0, 1)
     for degrees in (0.1, 28.6, 45, 61.4, 89.9, 133, 179):
         left, right = (realise(rotated(rod, "z", sign * degrees), 32).bounding_box() for sign in (1, -1))
@@ -131,12 +128,12 @@ def test_turns_by_any_angle_are_rotations_and_opposite_ones_mirror_each_other() 
     ],
     ids=["mirror", "skew", "scale"],
 )
-def test_what_is_no_rotation_is_refused(turn: Turn) -> None:
+def test_what_is_no_rotation_is_refused(turn):
     with pytest.raises(ProfileError, match="is no rotation"):
         Place(box(0, 1, 0, 1, 0, 1), turn)
 
 
-def test_equal_points_of_a_turned_frame_are_equal_to_the_last_bit() -> None:
+def test_equal_points_of_a_turned_frame_are_equal_to_the_last_bit():
     """However deep a move lies under the turn: a crack one rounding wide between two pieces is a leak."""
     drawn = box(3, 5, 1, 4, -2, 2), moved(box(-7, -5, 0.25, 3.25, 0, 4), 10, 0.75, -2)
     for degrees in (10.1, 33.3, 57.7, 121.9):
@@ -145,7 +142,7 @@ def test_equal_points_of_a_turned_frame_are_equal_to_the_last_bit() -> None:
 
 
 @pytest.mark.parametrize("character", sorted(CHARACTERS))
-def test_every_character_is_one_piece_of_sound_outline(character: str) -> None:
+def test_every_character_is_one_piece_of_sound_outline(character):
     solid = realise(engraving(character, 0.8, 0, 0.4), 32)
     assert len(solid.decompose()) == 1
     cells = solid.volume() / 0.4 / 0.64

@@ -1,9 +1,6 @@
 """Validation: what is refused, with field, value, limit and a nearest value that is accepted."""
 
-from __future__ import annotations
-
 import tomllib
-from pathlib import Path
 
 import pytest
 import tomli_w
@@ -18,7 +15,7 @@ from unitcad.validation import from_data, load, override, read, templates, warni
 NAMES = sorted(templates())
 
 
-def test_the_templates_are_all_there() -> None:
+def test_the_templates_are_all_there():
     assert set(NAMES) >= {
         "pass-through",
         "embedded",
@@ -32,32 +29,32 @@ def test_the_templates_are_all_there() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_resolved_spec_reads_back_as_itself(name: str) -> None:
+def test_a_resolved_spec_reads_back_as_itself(name):
     spec = load(name)
     assert from_data(tomllib.loads(to_toml(spec))) == spec
     assert spec.name == name
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_spec_is_the_same_text_whatever_was_written_before(name: str) -> None:
+def test_a_spec_is_the_same_text_whatever_was_written_before(name):
     for settings in ([], ["diameter_mm=16.5", "casting.vacuum=true"], []):
         spec = load(name, settings)
         assert to_toml(spec) == tomli_w.dumps(to_data(spec))
 
 
-def test_values_that_are_equal_and_read_otherwise_are_written_each_as_it_is() -> None:
+def test_values_that_are_equal_and_read_otherwise_are_written_each_as_it_is():
     for waste in (1.0, 1, 1.0):
         spec = structs.replace(load("embedded"), casting=structs.replace(load("embedded").casting, waste=waste))
         assert to_toml(spec) == tomli_w.dumps(to_data(spec))
 
 
-def test_a_path_and_a_name_find_the_same_template(tmp_path: Path) -> None:
+def test_a_path_and_a_name_find_the_same_template(tmp_path):
     copy = tmp_path / "mine.toml"
     copy.write_bytes(templates()["embedded"].read_bytes())
     assert load(str(copy)) == load("embedded")
 
 
-def test_odd_names_survive_the_file() -> None:
+def test_odd_names_survive_the_file():
     spec = load("embedded", [r'name="<script>\"é\"\\ \\n"'])
     assert from_data(tomllib.loads(to_toml(spec))).name == spec.name
 
@@ -95,9 +92,7 @@ def test_odd_names_survive_the_file() -> None:
         ("encapsulating", "estimate.tissue='forarm'", "estimate.tissue", "forearm"),
     ],
 )
-def test_refused_with_a_nearest_value_that_is_accepted(
-    template: str, setting: str, field: str, nearest: object
-) -> None:
+def test_refused_with_a_nearest_value_that_is_accepted(template, setting, field, nearest):
     with pytest.raises(Refusal) as refused:
         load(template, [setting])
     assert refused.value.field == field
@@ -151,13 +146,13 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("design='d.py'", r"^design = 'd\.py': name the function or Design in that file: d\.py:NAME$"),
     ],
 )
-def test_refused_in_plain_words(setting: str, words: str) -> None:
+def test_refused_in_plain_words(setting, words):
     with pytest.raises(Refusal, match=words):
         load("encapsulating", [setting])
 
 
 @pytest.mark.parametrize("key", ["a - at `$.motor", "a - at `$[0]", "a - at `$.materials[...]", "`", "", "x.y"])
-def test_a_key_is_named_whatever_it_looks_like(key: str) -> None:
+def test_a_key_is_named_whatever_it_looks_like(key):
     data = read("encapsulating")
     for table, place in ((data, ""), (data["motor"], "motor.")):
         table[key] = 1
@@ -167,7 +162,7 @@ def test_a_key_is_named_whatever_it_looks_like(key: str) -> None:
         del table[key]
 
 
-def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None:
+def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are():
     with pytest.raises(Refusal, match=r"known here: (\w+, ){4}\w+ and 13 more \(`unitcad schema` lists all\)"):
         load("encapsulating", ["xyz=1"])
     with pytest.raises(Refusal, match=r"unknown key; closest: wall_mm; nearest"):
@@ -178,27 +173,27 @@ def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None
         load("encapsulating", {"layers.1.skin_mm": 0.4})
 
 
-def test_a_custom_design_without_its_text_is_refused() -> None:
+def test_a_custom_design_without_its_text_is_refused():
     allow({ANY})
     with pytest.raises(Refusal, match=r"^design_source: is required with design = 'd\.py:unit'$"):
         from_data({**read("encapsulating"), "design": "d.py:unit"})
     allow_nothing()
 
 
-def test_a_missing_value_is_null_in_json() -> None:
+def test_a_missing_value_is_null_in_json():
     with pytest.raises(Refusal) as refused:
         load("encapsulating", ["wires={ count = 2 }"])
     assert refused.value.as_dict()["value"] is None
 
 
-def test_json_is_the_same_spec_and_plain_data_too() -> None:
+def test_json_is_the_same_spec_and_plain_data_too():
     for name in templates():
         spec = load(name)
         assert from_json(to_json(spec)) == spec
         assert from_data(to_data(spec)) == spec
 
 
-def test_embedded_layers_have_no_cap_and_encapsulating_ones_do() -> None:
+def test_embedded_layers_have_no_cap_and_encapsulating_ones_do():
     with pytest.raises(Refusal, match="open ring"):
         load("embedded", ["layers.0.cap_mm=1.0"])
     data = read("encapsulating")
@@ -207,7 +202,7 @@ def test_embedded_layers_have_no_cap_and_encapsulating_ones_do() -> None:
         from_data(data)
 
 
-def test_toml_that_does_not_parse_names_line_and_column(tmp_path: Path) -> None:
+def test_toml_that_does_not_parse_names_line_and_column(tmp_path):
     bad = tmp_path / "bad.toml"
     bad.write_text('name = "x"\ndesign = \n')
     with pytest.raises(UnitcadError, match=r"bad.toml:2:10: not TOML"):
@@ -221,7 +216,7 @@ def test_toml_that_does_not_parse_names_line_and_column(tmp_path: Path) -> None:
         load(f"{tmp_path}/")
 
 
-def test_a_spec_brings_its_own_material_motor_and_printer() -> None:
+def test_a_spec_brings_its_own_material_motor_and_printer():
     spec = override(read("encapsulating"), [])
     spec["materials"] = {"house": {"like": "ecoflex-00-30", "youngs_modulus_kpa": 40.0}}
     spec["motors"] = {"mine": {"diameter_mm": 6.0, "thickness_mm": 2.2}}
@@ -238,13 +233,13 @@ def test_a_spec_brings_its_own_material_motor_and_printer() -> None:
         from_data(spec)
 
 
-def test_a_long_list_of_known_names_is_cut() -> None:
+def test_a_long_list_of_known_names_is_cut():
     refused = unknown_name("body", "q", [f"cup{i:02}" for i in range(15)])
     assert refused.limit.endswith("cup08, cup09 and 5 more")
     assert refused.nearest is None
 
 
-def test_the_default_motor_is_that_of_a_spec_without_part_and_size() -> None:
+def test_the_default_motor_is_that_of_a_spec_without_part_and_size():
     data = read("encapsulating")
     given = from_data({**data, "motor": {"part": "LCM0720A3463F", "fill": True}})
     assert from_data({**data, "motor": {"fill": True}}) == given
@@ -254,20 +249,20 @@ def test_the_default_motor_is_that_of_a_spec_without_part_and_size() -> None:
         from_data({**data, "motor": {"diameter_mm": 7.0}})
 
 
-def test_a_layer_below_its_casting_floor_is_a_warning() -> None:
+def test_a_layer_below_its_casting_floor_is_a_warning():
     assert warnings(load("embedded")) == []
     thin = warnings(load("embedded", ["layers.0.wall_mm=0.8"]))
     assert len(thin) == 1
     assert "layers.0.wall_mm" in thin[0]
 
 
-def test_overrides_do_not_touch_the_source() -> None:
+def test_overrides_do_not_touch_the_source():
     data = read("embedded")
     override(data, ["layers.0.wall_mm=2.0"])
     assert data["layers"][0]["wall_mm"] == 1.25
 
 
-def test_a_name_has_at_most_120_characters() -> None:
+def test_a_name_has_at_most_120_characters():
     data = tomllib.loads(templates()["single-embedded"].read_text("utf-8"))
     longest = "x" * 120
     assert longest in from_data({**data, "materials": {longest: {"like": "ecoflex-00-30"}}}).materials
@@ -284,7 +279,7 @@ def test_a_name_has_at_most_120_characters() -> None:
         ("name = ", ""),
     ],
 )
-def test_a_word_without_quotes_is_told_of_them(line: str, advice: str) -> None:
+def test_a_word_without_quotes_is_told_of_them(line, advice):
     with pytest.raises(UnitcadError) as refused:
         parse_toml(f"diameter_mm = 14.0\n{line}\n", "mine.toml")
     assert str(refused.value).partition("Invalid value")[2] == advice

@@ -1,13 +1,10 @@
 """Every key of a spec changes a written file or what the checks find: none is read by nothing."""
 
-from __future__ import annotations
-
 import copy
 import typing
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 import pytest
@@ -23,7 +20,7 @@ from unitcad.spec.raw import OUTPUTS, RawSpec
 from unitcad.validation import from_data, put, read
 
 OWN = "ours"
-ENTRIES: dict[str, tuple[type[msgspec.Struct], type[msgspec.Struct], str]] = {
+ENTRIES = {
     "materials": (catalogue.Material, catalogue.MaterialEntry, OWN),
     "motors": (catalogue.Motor, catalogue.MotorEntry, OWN),
     "printers": (catalogue.Printer, catalogue.PrinterEntry, OWN),
@@ -40,11 +37,11 @@ def wide(spec): return drawn(7, spec.parameters["height_mm"])
 
 
 @cache
-def _fit_text() -> str:
+def _fit_text():
     return Path(__file__).with_name("lab-fit.toml").read_text("utf-8")
 
 
-OTHERS: dict[str, tuple[Any, ...]] = {
+OTHERS = {
     "name": ("another",),
     "design": ("d.py:wide",),
     "layers.0.material": ("ecoflex-00-50",),
@@ -66,7 +63,7 @@ OTHERS: dict[str, tuple[Any, ...]] = {
     "estimate.fit_source": (_fit_text().replace("synthetic-bench", "another"),),
 }
 """Values for keys whose type and range give none: names, texts and lists."""
-FIRST: dict[str, tuple[str, Any]] = {
+FIRST = {
     "output.tolerance_mm": ("whole", 0.05),
     "moulds.bed_z_mm": ("tall", 30.0),
     "moulds.sprue_mm": ("injected", 3.5),
@@ -80,12 +77,12 @@ FIRST: dict[str, tuple[str, Any]] = {
 
 
 @cache
-def _bases() -> dict[str, dict[str, Any]]:
+def _bases():
     """Specs that between them have every table; the cheap ones first."""
     coarse = {"formats": ["stl", "3mf"], "tolerance_mm": 0.2}
     whole = {**read("encapsulating"), "output": coarse}
 
-    def values(kind: str, name: str) -> dict[str, Any]:
+    def values(kind, name):
         entry = msgspec.to_builtins(getattr(catalogue, kind)()[name])
         return {key: value["value"] for key, value in entry.items() if isinstance(value, dict)}
 
@@ -134,7 +131,7 @@ def _bases() -> dict[str, dict[str, Any]]:
     }
 
 
-def _keys(table: type[msgspec.Struct], path: str) -> Iterator[tuple[str, Any]]:
+def _keys(table, path):
     """Every key below a table that holds a value, and its kind: of lists the first entry, of free tables an own one."""
     for key, field in fields_of(table).items():
         below = table_in(field.type) or table_in(entry_in(field.type))
@@ -154,7 +151,7 @@ def _keys(table: type[msgspec.Struct], path: str) -> Iterator[tuple[str, Any]]:
 KEYS = dict(_keys(RawSpec, ""))
 
 
-def _within(kind: Any, now: Any) -> Iterator[Any]:
+def _within(kind, now):
     """Values of a kind: near the present one, then all over its range."""
     for one in alternatives(kind):
         if typing.get_origin(one) is Literal:
@@ -171,7 +168,7 @@ def _within(kind: Any, now: Any) -> Iterator[Any]:
             yield from (one(round(v, 6)) for v in wanted if low <= v <= high and one(round(v, 6)) != now)
 
 
-def _at(data: Any, path: str) -> Any:
+def _at(data, path):
     for step in path.split("."):
         data = data[int(step)] if isinstance(data, list) else data.get(step) if isinstance(data, dict) else None
     return data
@@ -181,16 +178,16 @@ _STORE = MemoryStore()
 
 
 @cache
-def _resolved(base: str) -> dict[str, Any]:
+def _resolved(base):
     return msgspec.to_builtins(from_data(_bases()[base]))
 
 
 @cache
-def _before(base: str) -> dict[str, str]:
+def _before(base):
     return _written(_bases()[base])
 
 
-def _written(data: dict[str, Any]) -> dict[str, str]:
+def _written(data):
     """The content of each file that is written, as a hash, but for the spec itself; and what the checks find."""
     product = Subject(from_data(data)).make(OUTPUTS, True, _STORE, Progress())
     own = {path: digest(content) for path, content in product.own.items()}
@@ -200,7 +197,7 @@ def _written(data: dict[str, Any]) -> dict[str, str]:
     return {**own, **product.shared, **found}
 
 
-def _changes(path: str) -> Iterator[tuple[str, Any]]:
+def _changes(path):
     """Specs, and accepted values of a key for each."""
     if path in FIRST:
         yield FIRST[path]
@@ -209,7 +206,7 @@ def _changes(path: str) -> Iterator[tuple[str, Any]]:
         yield from ((name, value) for value in (*OTHERS.get(path, ()), *_within(KEYS[path], present)))
 
 
-def _effect(name: str, path: str, value: object) -> list[str]:
+def _effect(name, path, value):
     """The files that a change of a key changes; for one that is refused, the refusal where it names the key.
 
     What a printer can't make is refused in the name of the mould's length.
@@ -226,7 +223,7 @@ def _effect(name: str, path: str, value: object) -> list[str]:
 
 
 @pytest.mark.parametrize("path", [path for path in KEYS if path.rpartition(".")[2] not in PROVENANCE])
-def test_every_key_changes_something(path: str) -> None:
+def test_every_key_changes_something(path):
     assert any(_effect(name, path, value) for name, value in _changes(path))
 
 
@@ -241,11 +238,11 @@ def test_every_key_changes_something(path: str) -> None:
         ("source", "our own scale"),
     ],
 )
-def test_provenance_and_range_of_a_silicone_are_written(path: str, value: object) -> None:
+def test_provenance_and_range_of_a_silicone_are_written(path, value):
     assert _effect("own", f"materials.{OWN}.{path}", value)
 
 
-def test_a_key_that_is_read_by_nothing_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_key_that_is_read_by_nothing_is_seen(monkeypatch):
     for reader in ("figures", "preparation", "pouring"):
         monkeypatch.setattr(f"unitcad.casting.{reader}.at_room", lambda value, room_c: value)
     _before.cache_clear()
@@ -254,7 +251,7 @@ def test_a_key_that_is_read_by_nothing_is_seen(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.fixture(autouse=True)
-def _code_may_run() -> Iterator[None]:
+def _code_may_run():
     allow({ANY})
     yield
     allow_nothing()

@@ -1,7 +1,5 @@
 """What differs between Linux, macOS and Windows, tried here by standing in for the other system's calls."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -26,14 +24,14 @@ class OneReader(filelock.FileLock):
         os.mkdir(self.lock_file)  # what is opened or unlinked by this name now fails
         return got
 
-    def release(self, *args, **kwargs) -> None:
+    def release(self, *args, **kwargs):
         held = self.is_locked
         super().release(*args, **kwargs)
         if held:
             os.rmdir(self.lock_file)
 
 
-def test_nobody_reads_or_removes_a_file_that_is_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nobody_reads_or_removes_a_file_that_is_locked(tmp_path, monkeypatch):
     monkeypatch.setattr(filelock, "FileLock", OneReader)
     with files.scratch(tmp_path, "mine") as folder:
         assert (folder / files.MARK).read_text().splitlines()[-1] == "mine"
@@ -46,7 +44,7 @@ def test_nobody_reads_or_removes_a_file_that_is_locked(tmp_path: Path, monkeypat
     assert (tmp_path / "whole").read_bytes() == b"content"
 
 
-def test_the_cache_lives_with_locks_that_nobody_removes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_cache_lives_with_locks_that_nobody_removes(tmp_path, monkeypatch):
     from unitcad.cache import DiskStore, collect
     from unitcad.cache import disk as module
 
@@ -58,11 +56,11 @@ def test_the_cache_lives_with_locks_that_nobody_removes(tmp_path: Path, monkeypa
     assert collect(tmp_path / "c", 0).entries == 1
 
 
-def test_a_path_on_another_drive_is_shown_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_path_on_another_drive_is_shown_whole(monkeypatch):
     assert files.path_seen_from("a/../b/c.stl") == "b/c.stl"
     assert files.path_seen_from("/x/b/c.stl", "/x/d") == "../b/c.stl"
 
-    def other_drive(path: str, start: str = ".") -> str:
+    def other_drive(path, start="."):
         raise ValueError("path is on mount 'D:', start on mount 'C:'")
 
     monkeypatch.setattr(os.path, "relpath", other_drive)
@@ -70,16 +68,16 @@ def test_a_path_on_another_drive_is_shown_whole(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("name", ["con", "CON", "Nul.toml", "com1", "lpt9.tar.gz", "aux "])
-def test_names_of_devices_are_known(name: str) -> None:
+def test_names_of_devices_are_known(name):
     assert files.names_device(name)
 
 
 @pytest.mark.parametrize("name", ["cone", "com", "com10", "my-con", "null", "lpt"])
-def test_other_names_are_no_devices(name: str) -> None:
+def test_other_names_are_no_devices(name):
     assert not files.names_device(name)
 
 
-def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path, monkeypatch):
     """The same files by another separator, in the order in which another system sorts them."""
     for name in ("a/b.py", "a.py", "B.py", "a-b/c.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -88,10 +86,10 @@ def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path: Path, mon
     here = versions.code_version.__wrapped__()
 
     class Windows(PureWindowsPath):
-        def rglob(self, pattern: str):
+        def rglob(self, pattern):
             return sorted(Windows(path) for path in tmp_path.rglob(pattern) if path.is_file())
 
-        def read_bytes(self) -> bytes:
+        def read_bytes(self):
             return Path(self.as_posix()).read_bytes()
 
     monkeypatch.setattr(versions, "Path", Windows)
@@ -110,7 +108,7 @@ def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path: Path, mon
         ("linux", [], [], None),
     ],
 )
-def test_the_slicer_is_found_under_each_system_s_name(system, on_path, there, found, monkeypatch) -> None:
+def test_the_slicer_is_found_under_each_system_s_name(system, on_path, there, found, monkeypatch):
     monkeypatch.setattr(slicer.sys, "platform", system)
     monkeypatch.setattr(slicer.shutil, "which", lambda name: name if name in (*on_path, *there) else None)
     assert slicer.program() == found
@@ -119,7 +117,7 @@ def test_the_slicer_is_found_under_each_system_s_name(system, on_path, there, fo
             slicer.needs_repair(Path("x.stl"))
 
 
-def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path, monkeypatch):
     """A result's texts are written as bytes: a system whose lines end otherwise changes none of them."""
     monkeypatch.setattr(os, "linesep", "\r\n")
     monkeypatch.chdir(tmp_path)
@@ -135,7 +133,7 @@ def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path: Path, monke
 @pytest.mark.skipif(sys.platform == "win32", reason="a terminal of Windows takes any character")
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 @pytest.mark.parametrize("words", [["estimate"], ["estimate", "--json"], ["build", "--formats", "stl"]])
-def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding: str, words: list[str], tmp_path: Path) -> None:
+def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding, words, tmp_path):
     import json
     import subprocess
 
@@ -154,7 +152,7 @@ def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding: str, word
         assert any(name in shown for name in ("Größe Ω".encode(encoding, "backslashreplace"), "Größe Ω".encode()))
 
 
-def test_the_job_file_for_three_systems_fits_its_schema_and_names_what_there_is() -> None:
+def test_the_job_file_for_three_systems_fits_its_schema_and_names_what_there_is():
     root = Path(__file__).parent.parent
     job = root / ".github" / "workflows" / "systems.yml"
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(job)]

@@ -1,9 +1,5 @@
 """The line of every key of a TOML text, and the limit of its size."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from unitcad.errors import Refusal, UnitcadError
@@ -51,7 +47,7 @@ LINES = {
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("path", LINES)
-def test_each_key_is_on_its_line(path: str, end: str) -> None:
+def test_each_key_is_on_its_line(path, end):
     assert line_of(TEXT.replace("\n", end), path) == LINES[path]
 
 
@@ -66,22 +62,20 @@ def test_each_key_is_on_its_line(path: str, end: str) -> None:
     ],
     ids=["tables", "keys", "list", "inline", "10 MB"],
 )
-def test_a_text_with_too_many_entries_is_refused_before_it_is_parsed(
-    text: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_text_with_too_many_entries_is_refused_before_it_is_parsed(text, monkeypatch):
     monkeypatch.setattr("tomllib.loads", None)
     with pytest.raises(UnitcadError, match=r"^big: has more than 20,000 keys, tables and list entries$"):
         parse_toml(text, "big")
 
 
-def test_marks_inside_texts_and_comments_do_not_count() -> None:
+def test_marks_inside_texts_and_comments_do_not_count():
     long = "=,[" * MOST
     assert parse_toml(f"# {long}\na = \"{long}\"\nb = '''\n{long}'''", "x") == {"a": long, "b": long}
 
 
 @pytest.mark.parametrize("form", ["{} = 1", "[{}]", "[[{}]]", "x = {{ {} = 1 }}"])
 @pytest.mark.parametrize("parts", [500, 5000])
-def test_a_dotted_key_of_many_parts_is_refused_on_its_line(form: str, parts: int, tmp_path: Path) -> None:
+def test_a_dotted_key_of_many_parts_is_refused_on_its_line(form, parts, tmp_path):
     file = tmp_path / "deep.toml"
     file.write_text(f'name = "deep"\n\n{form.format(".".join("a" * parts))}\n')
     with pytest.raises(Refusal, match="nests more than 20 tables deep") as refused:

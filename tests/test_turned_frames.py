@@ -6,8 +6,6 @@ joint of insert and block has a seal: where faces meet but for a rounding, boole
 slant in eleven.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -25,7 +23,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Removal, base_piece
 from unitcad.moulds.plan import Step
 from unitcad.moulds.surroundings import crop
-from unitcad.shape import Common, Shape, box, cut, cylinder, exact_volume, moved, ring, rotated, union
+from unitcad.shape import Common, box, cut, cylinder, exact_volume, moved, ring, rotated, union
 from unitcad.shape.column import Column, Standing
 from unitcad.shape.tree import Body
 from unitcad.validation import load
@@ -40,26 +38,25 @@ WITHOUT_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)
 SLANTS = st.tuples(st.floats(-180, 180), st.floats(-60, 60), st.floats(-180, 180))
 """Turns about z, y and z again, degrees."""
 AT = st.tuples(*[st.integers(-20_000, 20_000).map(lambda steps: steps / 1024)] * 2)
-Slant = tuple[float, float, float]
 
 
-def placed(shape: Shape, slant: Slant, at: tuple[float, float]) -> Shape:
+def placed(shape, slant, at):
     """The solid at a slant, where its unit stands."""
     first, tilt, second = slant
     return moved(rotated(rotated(rotated(shape, "z", first), "y", tilt), "z", second), *at)
 
 
-def axis_of(slant: Slant) -> tuple[float, float, float]:
+def axis_of(slant):
     """The unit's axis, by mathematics of its own: the first turn is about it."""
     _, tilt, second = (math.radians(degrees) for degrees in slant)
     return math.sin(tilt) * math.cos(second), math.sin(tilt) * math.sin(second), math.cos(tilt)
 
 
-def block(at: tuple[float, float]) -> Shape:
+def block(at):
     return moved(box(-60, 60, -60, 60, -20, TOP), *at)
 
 
-def mould(slant: Slant, at: tuple[float, float], insert: Shape = INSERT) -> MouldSet:
+def mould(slant, at, insert=INSERT):
     """The block as a mould: an insert lies in the moat, the rest is poured."""
     spec = load(LEADLESS)
     plan = MouldSet(spec).plan
@@ -81,7 +78,7 @@ def mould(slant: Slant, at: tuple[float, float], insert: Shape = INSERT) -> Moul
     return made
 
 
-def faults(moulds: MouldSet) -> set[str]:
+def faults(moulds):
     """The codes of balance and overlap that a mould breaks."""
     found = [*balance.findings(moulds), *(f for f in overlap.findings(moulds) if f.where.startswith("pour"))]
     assert {finding.code for finding in found} == {"C100", "C200"}
@@ -90,13 +87,13 @@ def faults(moulds: MouldSet) -> set[str]:
 
 @settings(max_examples=25, deadline=None, phases=WITHOUT_SHRINKING)
 @given(SLANTS, AT)
-def test_a_mould_balances_and_nothing_overlaps_at_any_slant(slant: Slant, at: tuple[float, float]) -> None:
+def test_a_mould_balances_and_nothing_overlaps_at_any_slant(slant, at):
     assert faults(mould(slant, at)) == set()
 
 
 @settings(max_examples=10, deadline=None, phases=WITHOUT_SHRINKING)
 @given(SLANTS)
-def test_what_blocks_a_piece_along_its_own_axis_is_the_same_area_at_any_slant(slant: Slant) -> None:
+def test_what_blocks_a_piece_along_its_own_axis_is_the_same_area_at_any_slant(slant):
     collar = moved(cylinder(8, 0, 0.5), z=3)
     for piece, area in ((INSERT, 0.0), (union((INSERT, collar)), math.pi * (8**2 - 7**2))):
         stays = cut(cylinder(9, -3, 20), [union((MOAT, piece))])
@@ -104,7 +101,7 @@ def test_what_blocks_a_piece_along_its_own_axis_is_the_same_area_at_any_slant(sl
         assert blocked_area(one, other, axis_of(slant)) == pytest.approx(area, abs=1e-9)
 
 
-def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up() -> None:
+def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up():
     slant = (12.0, 28.6, 40.0)
     moulds = mould(slant, (3.0, 2.0))
     for way, comes in ((axis_of(slant), True), ((0, 0, 1), False), (axis_of((12.0, 24.0, 40.0)), False)):
@@ -119,7 +116,7 @@ def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up()
 
 @settings(max_examples=4, deadline=None, phases=WITHOUT_SHRINKING)
 @given(SLANTS, AT)
-def test_the_kernels_agree_at_any_slant(slant: Slant, at: tuple[float, float]) -> None:
+def test_the_kernels_agree_at_any_slant(slant, at):
     occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)  # type: ignore[arg-type]
     wall = placed(ring(3, 5, -1, 2), slant, at)
     base = cut(block(at), [placed(MOAT, slant, at)])
@@ -134,7 +131,7 @@ def test_the_kernels_agree_at_any_slant(slant: Slant, at: tuple[float, float]) -
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_what_a_column_is_told_to_hold_is_what_turned_solids_have_there(axis: str) -> None:
+def test_what_a_column_is_told_to_hold_is_what_turned_solids_have_there(axis):
     """The reduced trees fill the column as the whole does; an upright tree would keep its corners and lose the rest."""
     for degrees in (7.0, 30.0, 63.3, 141.0):
         tree = union((rotated(box(-12, 12, -1, 1, -1, 1), axis, degrees), rotated(moved(CORE, 9), axis, -degrees)))

@@ -3,8 +3,6 @@
 `python tests/test_words.py` writes the table anew.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import tomllib
@@ -28,21 +26,21 @@ LIMIT = 25_000
 """Words of the pages that people write, without code, at most."""
 
 
-def _strings(source: str) -> str:
+def _strings(source):
     """Return all strings of three words or more in a module, docstrings included."""
     nodes = ast.walk(ast.parse(source))
     found = (node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str))
     return "\n\n".join(text for text in found if len(text.split()) >= 3)
 
 
-def _prose(markdown: str) -> str:
+def _prose(markdown):
     """Return a page's text without code and tables."""
     return re.sub(r"(?m)^\|.*$", "", re.sub(r"(?s)```.*?```", "", markdown))
 
 
-def _folders() -> dict[str, dict[str, str]]:
+def _folders():
     """Return the text of each file by folder and name."""
-    texts: dict[str, dict[str, str]] = defaultdict(dict)
+    texts = defaultdict(dict)
     for path in sorted((ROOT / "unitcad").rglob("*.py")):
         parts = path.relative_to(ROOT / "unitcad").parts
         texts[f"unitcad/{parts[0]}" if len(parts) > 1 else "unitcad"]["/".join(parts)] = _strings(
@@ -54,9 +52,9 @@ def _folders() -> dict[str, dict[str, str]]:
     return texts
 
 
-def _found() -> dict[str, dict[str, list[str]]]:
+def _found():
     """Return the sentences of each pattern, and the long ones, after their file's name, by folder."""
-    table: dict[str, dict[str, list[str]]] = {}
+    table = {}
     for folder, texts in _folders().items():
         row = table[folder] = {pattern: [] for pattern in (*PATTERNS, "long sentences")}
         for name, text in texts.items():
@@ -68,12 +66,12 @@ def _found() -> dict[str, dict[str, list[str]]]:
     return table
 
 
-def counts() -> dict[str, dict[str, int]]:
+def counts():
     """Return the count of each pattern, and of long sentences, by folder."""
     return {folder: {pattern: len(places) for pattern, places in row.items()} for folder, row in _found().items()}
 
 
-def test_bad_words_do_not_increase() -> None:
+def test_bad_words_do_not_increase():
     limits = tomllib.loads(TABLE.read_text("utf-8"))
     more = {
         f"{folder}: {pattern}: {len(places)}, at most {limits.get(folder, {}).get(pattern, 0)}": places
@@ -84,7 +82,7 @@ def test_bad_words_do_not_increase() -> None:
     assert more == {}
 
 
-def test_the_docs_stay_short() -> None:
+def test_the_docs_stay_short():
     pages = [path.read_text("utf-8") for path in (ROOT / "docs").rglob("*.md") if "evidence" not in path.parts]
     assert sum(len(re.sub(r"(?s)```.*?```", "", page).split()) for page in pages) <= LIMIT
 

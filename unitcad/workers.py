@@ -87,7 +87,6 @@ class Pool(Executor):
     """`size` workers, which start now. The end of the block ends them at once.
 
     memory: bytes of address space of each worker (Linux only). load: modules that each worker imports first.
-    prepare: a function and its arguments, called in each worker before its first call.
     """
 
     def __init__(
@@ -96,9 +95,8 @@ class Pool(Executor):
         *,
         memory: int | None = None,
         load: Sequence[str] = (),
-        prepare: tuple[Any, ...] = (),
     ) -> None:
-        self._setup = pickle.dumps((_set_up, (memory, tuple(load), prepare), {}))
+        self._setup = pickle.dumps((_set_up, (memory, tuple(load)), {}))
         self._lock = threading.RLock()  # a callback of a cancelled call may submit another one
         self._waiting: deque[Call] = deque()
         self._idle: list[queue.SimpleQueue[Call | None]] = []  # the one used last is used next: its memory is warm
@@ -427,13 +425,11 @@ def _serve() -> None:
             _send(_answers, message)
 
 
-def _set_up(memory: int | None, load: tuple[str, ...], prepare: tuple[Any, ...]) -> None:
+def _set_up(memory: int | None, load: tuple[str, ...]) -> None:
     limit_memory(memory)
     gc.set_threshold(200_000)  # by default modules that load are searched for cycles ninety times
     for name in load:
         importlib.import_module(name)
-    if prepare:
-        prepare[0](*prepare[1:])
     gc.collect()
     gc.freeze()  # modules last as long as the process
 

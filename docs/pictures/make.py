@@ -84,7 +84,7 @@ def gallery() -> dict[str, bytes]:
     made = {}
     for path in sorted((HERE.parent / "gallery").glob("*.toml")):
         if compound_kind(path):
-            made[path.stem] = patch_pictures(patch_moulds(load_array(str(path))))["pictures/patch-skin-side.png"]
+            made[path.stem] = patch_pictures(patch_moulds(load_array(str(path))))["pictures/patch-skin-side.png"]()
         else:
             made[path.stem] = unit_cut_open(Variant.of(str(path)))
     return {f"gallery-{name}.png": small(image) for name, image in made.items()}
@@ -101,14 +101,14 @@ def arrays() -> dict[str, bytes]:
     maps = crosstalk_files(array)
     return {
         **{
-            f"array-{kind}-{name}.png": files[f"pictures/{path}.png"]
+            f"array-{kind}-{name}.png": files[f"pictures/{path}.png"]()
             for kind, files in drawn.items()
             for name, path in ARRAY_PICTURES.items()
         },
-        "array-band-bent.png": band["pictures/patch-bent.png"],
-        "array-band-tools.png": band["pictures/tools.png"],
-        "array-curved-tools.png": sleeve["pictures/tools.png"],
-        "array-curved-pour2.png": sleeve["pictures/pour2.png"],
+        "array-band-bent.png": band["pictures/patch-bent.png"](),
+        "array-band-tools.png": band["pictures/tools.png"](),
+        "array-curved-tools.png": sleeve["pictures/tools.png"](),
+        "array-curved-pour2.png": sleeve["pictures/pour2.png"](),
         "array-crosstalk.svg": maps["crosstalk.svg"],
         "array-crosstalk-patch.svg": maps["crosstalk-patch.svg"],
     }

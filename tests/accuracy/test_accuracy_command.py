@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +19,7 @@ from unitcad.accuracy.measurements import (
     REFERENCE,
     RTOLS,
     compare,
+    interleaved,
     mesh_rows,
     respond,
     response_rows,
@@ -41,18 +43,18 @@ SPEC = load("encapsulating")
 VARIANT = estimate_input(SPEC)
 
 
-def _response(u: float, error: float) -> Response:
+def _response(u, error):
     return Response(*(np.full(2, value) for value in (u, 0.0, u, error, 0.0, error)), wavenumbers=9)
 
 
-def test_an_error_counts_by_what_exceeds_the_references_own_bound() -> None:
+def test_an_error_counts_by_what_exceeds_the_references_own_bound():
     found = compare(_response(1.03, 0.02), _response(1.0, 0.01))
     assert (found.error, found.bound, found.over_bound) == pytest.approx((0.03, 0.02, 1.0))
     assert compare(_response(1.005, 0.0), _response(1.0, 0.01)).over_bound == 0
     assert compare(_response(math.nan, 0.02), _response(1.0, 0.01)).over_bound == math.inf
 
 
-def test_the_errors_of_the_response_are_those_against_a_reference_that_shares_no_code() -> None:
+def test_the_errors_of_the_response_are_those_against_a_reference_that_shares_no_code():
     pytest.importorskip("flint")
     distances = np.array([0.0, 5e-3, 30e-3])
     load_of_motor = UniformDisc(VARIANT.motor_diameter / 2, "tangential")
@@ -68,13 +70,13 @@ def test_the_errors_of_the_response_are_those_against_a_reference_that_shares_no
         assert compare(found, tight).error == pytest.approx(error, rel=1e-4, abs=1e-12)
 
 
-def test_every_row_of_the_response_is_within_its_bound_and_its_rtol() -> None:
+def test_every_row_of_the_response_is_within_its_bound_and_its_rtol():
     rows = response_rows(VARIANT, repeats=1)
     assert [row["rtol"] for row in rows] == list(RTOLS)
     assert all(row["over_bound"] <= 1 and row["bound"] <= row["rtol"] and row["s"] > 0 for row in rows)
 
 
-def test_amplifications_obey_the_laws_of_scale() -> None:
+def test_amplifications_obey_the_laws_of_scale():
     """Moduli, viscosities and density times c: the same wavelengths, and 1/c of the motion."""
     viscous = [changed_struct(layer, damping_law="kelvin_voigt", damping=Quantity(5.0)) for layer in VARIANT.tissue]
     found = amplifications(SPEC, changed_struct(VARIANT, tissue=tuple(viscous)))
@@ -91,7 +93,7 @@ def test_amplifications_obey_the_laws_of_scale() -> None:
     assert worst["amplification"] == max(map(abs, motion.values())) == abs(motion[worst["worst"]])
 
 
-def test_an_extreme_design_is_named_with_its_place() -> None:
+def test_an_extreme_design_is_named_with_its_place():
     assert not any(row["extreme"] for row in extremes(SPEC, VARIANT))
     thin = [changed_struct(layer, poisson_ratio=0.49999) for layer in VARIANT.tissue]
     thin[0] = changed_struct(thin[0], thickness=Quantity(1e-5))
@@ -106,13 +108,13 @@ def test_an_extreme_design_is_named_with_its_place() -> None:
     assert film["value"] == pytest.approx(1e-5 * VARIANT.frequency.middle / speed)
 
 
-def test_a_body_without_layers_has_no_thinnest_one() -> None:
+def test_a_body_without_layers_has_no_thinnest_one():
     bone = changed_struct(VARIANT, tissue=VARIANT.tissue[-1:])
     film = next(row for row in extremes(SPEC, bone) if "thinnest layer" in row["what"])
     assert (film["value"], film["at"], film["extreme"]) == (math.inf, "no layer", False)
 
 
-def test_a_cylinder_is_as_far_off_as_its_area_true_polygon() -> None:
+def test_a_cylinder_is_as_far_off_as_its_area_true_polygon():
     """Its corners are r (a - 1) outside, which is its bound, and its volume is exact."""
     pytest.importorskip("OCP")
     radius = 7.0
@@ -132,12 +134,13 @@ def test_a_cylinder_is_as_far_off_as_its_area_true_polygon() -> None:
         assert row["body"] == "can"
 
 
-def test_the_specs_own_tolerance_is_among_the_five() -> None:
+def test_the_specs_own_tolerance_is_among_the_five():
     assert tolerances_of(0.02) == (0.1, 0.02, 0.01, 0.003, 0.001)
     assert tolerances_of(0.0005) == (0.1, 0.03, 0.01, 0.003, 0.0005)
 
 
-def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
+def test_a_request_leaves_out_what_it_does_not_ask_for(monkeypatch):
+    monkeypatch.setattr("unitcad.accuracy.measurements.interleaved", partial(interleaved, warm=False))
     spec = load("single-embedded", ["output.formats=['stl']"])
     rows = {row["request"]: row for row in skipped_rows(Subject(spec))}
     left = {name: {one["output"] for one in row["skipped"]} for name, row in rows.items()}
@@ -147,9 +150,11 @@ def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
     assert rows["unit only"]["s"] + rows["unit only"]["saved_s"] == pytest.approx(rows["everything"]["s"])
 
 
-def test_an_array_is_measured_as_it_is_cast(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_array_is_measured_as_it_is_cast(monkeypatch):
     pair = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 10]"]
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.skipped_rows", lambda subject: [])
+    for part in ("response_rows", "skipped_rows", "amplifications"):  # as of the unit alone
+        monkeypatch.setattr(f"unitcad.accuracy.accuracy_command.{part}", lambda *_: [])
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.mesh_rows", partial(mesh_rows, repeats=1))
     sets = [word for change in pair for word in ("--set", change)]
     done = CliRunner().invoke(app, ["accuracy", "forearm-pockets", *sets, "--json"])
     assert done.exit_code == 0, done.stderr
@@ -163,7 +168,7 @@ def test_an_array_is_measured_as_it_is_cast(monkeypatch: pytest.MonkeyPatch) -> 
     assert triangles == sorted(triangles)
 
 
-def test_a_survey_repeats_by_its_seed_and_names_what_is_worst() -> None:
+def test_a_survey_repeats_by_its_seed_and_names_what_is_worst():
     first, again, other = (survey.survey_media(2, seed, lambda stage: None) for seed in (0, 0, 1))
     errors = [[row["error"] for row in found["by_rtol"]] for found in (first, again, other)]
     assert errors[0] == errors[1] != errors[2]
@@ -173,7 +178,7 @@ def test_a_survey_repeats_by_its_seed_and_names_what_is_worst() -> None:
     assert (worst["class"], worst["seed"]) in {("ordinary", 0), ("film on the forearm", 0)}
 
 
-def test_a_response_off_by_more_than_its_bound_is_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_response_off_by_more_than_its_bound_is_exit_code_1(monkeypatch):
     exact = LayeredMedium.response
 
     def off(*arguments, rtol, **keywords):
@@ -187,7 +192,7 @@ def test_a_response_off_by_more_than_its_bound_is_exit_code_1(monkeypatch: pytes
     assert json.loads(done.stdout)["media"]["by_rtol"][4]["bounds_broken"] == 1
 
 
-def test_a_spec_that_is_neither_built_nor_refused_is_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_spec_that_is_neither_built_nor_refused_is_exit_code_1(monkeypatch):
     monkeypatch.setattr(survey, "outcome", lambda data: survey.Outcome("crash", "KeyError: 'x'"))
     found = survey.survey_specs(4, 2, lambda stage: None)
     assert [row["faults"] for row in found["by_ranges"]] == [3, 1]
@@ -206,25 +211,29 @@ def test_a_spec_that_is_neither_built_nor_refused_is_exit_code_1(monkeypatch: py
         (["--set", "diameter_mm=15"], "--set"),
     ],
 )
-def test_options_of_the_survey_are_refused_for_a_spec(words: list[str], field: str) -> None:
+def test_options_of_the_survey_are_refused_for_a_spec(words, field):
     done = CliRunner().invoke(app, ["accuracy", *words])
     assert isinstance(done.exception, Refusal)
     assert done.exception.field == field
 
 
-@pytest.mark.parametrize("form", [[], ["--json"]], ids=["text", "json"])
-def test_the_command_shows_every_part(form: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_shows_every_part(monkeypatch):
     mesh_row = {"tolerance_mm": 0.1, "distance_mm": None, "triangles": 12, "within_bounds": False}
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.mesh_rows", lambda *_: [mesh_row])
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.skipped_rows", lambda spec: [])
-    done = CliRunner().invoke(app, ["accuracy", "single-embedded", *form])
-    assert done.exit_code == 1, done.stderr
-    assert "an error exceeds its bound" in done.stderr
-    if form:
-        assert list(json.loads(done.stdout)) == [
-            "spec", "meshes", "response", "extremes", "amplification", "skipped"
-        ]  # fmt: skip
-    else:
-        for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Time saved"):
-            assert part in done.stdout
-        assert len(done.stdout.splitlines()) < 60
+    rows = cache(partial(response_rows, repeats=1))
+    found = cache(lambda: amplifications(SPEC, VARIANT))
+    patched = {
+        "mesh_rows": lambda *_: [mesh_row],
+        "response_rows": lambda _: rows(VARIANT),
+        "amplifications": lambda *_: found(),
+        "skipped_rows": lambda _: [],
+    }
+    for part, made in patched.items():
+        monkeypatch.setattr(f"unitcad.accuracy.accuracy_command.{part}", made)
+    text, data = (CliRunner().invoke(app, ["accuracy", "encapsulating", *form]) for form in ([], ["--json"]))
+    for done in (text, data):
+        assert done.exit_code == 1, done.stderr
+        assert "an error exceeds its bound" in done.stderr
+    assert list(json.loads(data.stdout)) == ["spec", "meshes", "response", "extremes", "amplification", "skipped"]
+    for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Time saved"):
+        assert part in text.stdout
+    assert len(text.stdout.splitlines()) < 60

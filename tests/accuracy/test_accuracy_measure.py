@@ -1,7 +1,5 @@
 """The suite of signal chains: its records' truth, and its promises at a small size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from benchmarks.accuracy import measure
 from benchmarks.accuracy.synthetic_records import PLAIN, RATE, SCENARIOS, Scenario, synthetic
 
 
-def test_a_record_has_the_amplitude_it_states() -> None:
+def test_a_record_has_the_amplitude_it_states():
     quiet = synthetic(Scenario("", snr=1e9), np.random.default_rng(1), 7.0, 125.0)
     assert np.sqrt(2) * quiet.x.std() == pytest.approx(7.0, rel=1e-3)
     noisy = synthetic(Scenario("", snr=10.0), np.random.default_rng(1), 7.0, 125.0)
@@ -18,7 +16,7 @@ def test_a_record_has_the_amplitude_it_states() -> None:
     assert np.array_equal(again.x, synthetic(SCENARIOS[-1], np.random.default_rng(2)).x)
 
 
-def test_the_suite_keeps_its_promises(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_suite_keeps_its_promises(monkeypatch):
     monkeypatch.setattr(measure, "QUICK_TRIALS", 12)
     monkeypatch.setattr(measure, "SCENARIOS", (PLAIN,))
     result = measure.run(True, lambda stage: None)

@@ -73,7 +73,7 @@ def test_promises_are_a_line_with_the_tightest():
     assert kept(promises[:1]) == "1 promise, all kept"
 
 
-def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
+def test_results_survive_the_file_and_suites_are_merged(tmp_path):
     runner.write([RESULT], tmp_path)
     other = Result("moulds", "Mould checks", "More.")
     runner.write([other], tmp_path)
@@ -90,7 +90,7 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
         runner.read(tmp_path)
 
 
-def test_the_stored_results_are_read_and_a_cell_of_another_type_is_not_written(tmp_path: Path):
+def test_the_stored_results_are_read_and_a_cell_of_another_type_is_not_written(tmp_path):
     assert len(runner.read(Path(__file__).parents[2] / "docs" / "evidence")) > 5
     with pytest.raises(TypeError, match="Table t"):
         replace(RESULT, tables=(Table("t", ("a",), ((True,),)),)).as_dict()
@@ -141,7 +141,7 @@ def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     assert float(said[1]) == pytest.approx(max(over), abs=0.006)
 
 
-def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "run", lambda *_: pytest.fail("worked"))
     (tmp_path / "file").touch()
     (tmp_path / "damaged").mkdir()
@@ -180,7 +180,7 @@ def test_timing_is_interleaved_and_shows_its_spread():
     assert shown(1.23456e-7) == "1.2e-07"
 
 
-def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch, capsys):
+def test_the_command_fails_on_a_broken_promise_alone(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runner, "run", lambda *_: RESULT)
     with pytest.raises(SystemExit) as stopped:
         accuracy(["stability"], quick=True, specs=None, out=tmp_path, as_json=True)

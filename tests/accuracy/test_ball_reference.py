@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.ball_reference import Kernel, TooHard, response
-from unitcad.accuracy.random_media import CLASSES, Trial, trial
+from unitcad.accuracy.random_media import CLASSES, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered import KelvinVoigt, Load, LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc
 
 pytest.importorskip("flint")
 
@@ -23,7 +23,7 @@ GEL = LayeredMedium([Layer(50e-6, 1000, 1e3, 0.4999, LossFactor(0.3)), *FOREARM]
 NEARLY_FLUID = LayeredMedium([Layer(1e-4, 1000, 1e-3, 0.4999999999, KelvinVoigt(1e-3)), *FOREARM], BONE)
 
 
-def _off(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: float, tolerances: tuple[float, ...]):
+def _off(medium, load, omega, r, z, tolerances):
     """Largest (true error - doubt) / bound of each tolerance; the doubt is small beside the largest |u| or the bound.
 
     (Where a film takes more wavenumbers than either of them spends, both stop early.)
@@ -37,7 +37,7 @@ def _off(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: floa
         yield float(np.max((wrong - exact.doubt) / np.array([getattr(found, f"error_{name}") for name in components])))
 
 
-def _not_sideways(one: Trial) -> Trial:
+def _not_sideways(one):
     return replace(one, load=replace(one.load, direction="radial")) if one.load.direction == "tangential" else one
 
 

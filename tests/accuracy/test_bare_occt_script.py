@@ -1,7 +1,5 @@
 """The script that the whole command is timed beside writes the same bodies as unitcad: names, and volumes by OCCT."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -17,7 +15,7 @@ from unitcad.pipeline.variant import Variant
 SCRIPTS = Path(__file__).parents[2] / "benchmarks" / "encapsulating"
 
 
-def test_the_bare_script_draws_what_unitcad_draws(tmp_path: Path) -> None:
+def test_the_bare_script_draws_what_unitcad_draws(tmp_path):
     lengths = tmp_path / "lengths.json"
     for words in (["lengths.py", lengths], ["bare_occt.py", lengths, tmp_path / "bare", "step"]):
         subprocess.run([sys.executable, *map(str, [SCRIPTS / words[0], *words[1:]])], check=True, capture_output=True)

@@ -1,7 +1,5 @@
 """The bound of an amplitude against sums, integrals and matrices that share no code with it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -15,17 +13,17 @@ from benchmarks.accuracy.synthetic_records import PLAIN, SCENARIOS
 TIME = np.arange(4000) / 2000
 
 
-def test_white_noise_has_the_textbooks_bound() -> None:
+def test_white_noise_has_the_textbooks_bound():
     """2/n over the squared signal-to-noise ratio, far from all other lines."""
     assert amplitude_bound(PLAIN, 127.0) == pytest.approx(np.sqrt(2 / 4000) / 30, rel=2e-3)
 
 
 @pytest.mark.parametrize("hz", [100.05, 100.27, 100.6, 127.0, 149.9])
-def test_mains_beside_the_line_raise_the_bound(hz: float) -> None:
+def test_mains_beside_the_line_raise_the_bound(hz):
     """Derivatives by differences of a record's formula, the mains' prior as two more observations."""
     part, snr = 0.03, 30.0
 
-    def model(p: np.ndarray) -> np.ndarray:
+    def model(p):
         size, phase, frequency, cosine, sine, offset, slope, *harmonics = p
         angle = 2 * np.pi * frequency * TIME + phase
         mains = 2 * np.pi * 50 * round(hz / 50) * TIME
@@ -44,7 +42,7 @@ def test_mains_beside_the_line_raise_the_bound(hz: float) -> None:
     assert amplitude_bound(scenario, hz) == pytest.approx(expected, rel=0.01)
 
 
-def test_the_bound_in_coloured_noise_is_that_of_its_covariance() -> None:
+def test_the_bound_in_coloured_noise_is_that_of_its_covariance():
     """By the inverse of the noise's circulant covariance, whose first column is the spectrum's inverse transform."""
     scenario = next(one for one in SCENARIOS if one.red)
     columns = np.array([np.cos(2 * np.pi * 125.3 * TIME), np.sin(2 * np.pi * 125.3 * TIME), TIME - 1])

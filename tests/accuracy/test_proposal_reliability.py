@@ -1,7 +1,5 @@
 """The suite that judges proposals: a unit left out is not in its own prediction; planted faults break promises."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +11,7 @@ from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.ranges import coverage
 
 
-def test_a_units_own_level_does_not_enter_its_prediction() -> None:
+def test_a_units_own_level_does_not_enter_its_prediction():
     table = measured_table()
     before = suite.leave_one_out("rule", table)
     for i in (0, 4):
@@ -25,7 +23,7 @@ def test_a_units_own_level_does_not_enter_its_prediction() -> None:
         assert changed[1].met != before[1].met
 
 
-def test_a_table_without_a_unit_has_the_others_in_their_order() -> None:
+def test_a_table_without_a_unit_has_the_others_in_their_order():
     table = measured_table()
     left = table.without(3)
     assert left.names == (*table.names[:3], *table.names[4:])
@@ -33,13 +31,13 @@ def test_a_table_without_a_unit_has_the_others_in_their_order() -> None:
     assert len(left.inputs) == len(left.layers) == len(left.designs) == 8
 
 
-def test_intervals_are_those_of_clopper_and_pearson() -> None:
+def test_intervals_are_those_of_clopper_and_pearson():
     low, high = suite.interval(6, 9)
     assert low == pytest.approx(beta.ppf(0.025, 6, 4))
     assert high == pytest.approx(beta.ppf(0.975, 7, 3))
 
 
-def _of(levels: list[float], shift: float) -> list[suite.Judged]:
+def _of(levels, shift):
     made = []
     for level in levels:
         middle = level * np.exp(shift)
@@ -48,7 +46,7 @@ def _of(levels: list[float], shift: float) -> list[suite.Judged]:
     return made
 
 
-def test_the_promises_fail_for_ranges_that_miss_and_probabilities_that_say_nothing() -> None:
+def test_the_promises_fail_for_ranges_that_miss_and_probabilities_that_say_nothing():
     levels = measured_table().levels.tolist()
     right, wrong = _of(levels, 0.0), _of(levels, 2.0)
     assert suite._miss(right) == 0.0
@@ -59,11 +57,11 @@ def test_the_promises_fail_for_ranges_that_miss_and_probabilities_that_say_nothi
     assert p.size == met.size == 9 * len(suite.LEVELS)
 
 
-def test_the_suite_runs_and_keeps_its_promises() -> None:
+def test_the_suite_runs_and_keeps_its_promises():
     result = suite.run(True, lambda line: None)
     assert result.ok, [one for one in result.promises if not one.ok]
     assert len(result.promises) == 3
 
 
-def test_how_many_ranges_held_is_what_an_estimate_says() -> None:
+def test_how_many_ranges_held_is_what_an_estimate_says():
     assert sum(one.held for one in suite.leave_one_out("rule", measured_table())) == coverage()

@@ -1,7 +1,5 @@
 """Random specs: exit 0 with every check passed, or a refusal whose nearest value leads on."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import subprocess
@@ -14,7 +12,7 @@ from hypothesis import strategies as st
 
 from benchmarks.accuracy import extremes
 from benchmarks.accuracy.runner import JOURNALS
-from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, Seeded, random_spec, seeded_spec
+from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Seeded, random_spec, seeded_spec
 from unitcad.accuracy.survey import (
     BUILT,
     GOOD,
@@ -48,7 +46,7 @@ class Drawn:
 
 
 @st.composite
-def specs(draw, ranges: Ranges):
+def specs(draw, ranges):
     return random_spec(Drawn(draw), ranges)
 
 
@@ -74,7 +72,7 @@ def test_most_of_the_documented_ranges_builds():
 
 
 def test_nearest_values_lead_to_a_build_or_another_limit():
-    for seed in range(150):
+    for seed in range(60):
         data = seeded_spec(seed, "extreme")
         for _ in range(41):
             refusal = refusal_of(data)
@@ -145,7 +143,7 @@ def test_an_interrupted_study_resumes(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_lids_and_wires_keep_the_laws_or_are_refused(seed: int) -> None:
+def test_random_lids_and_wires_keep_the_laws_or_are_refused(seed):
     """From the documented ranges, with lids, resin and wires added: the nearest accepted values lead to a good set."""
     data, choose = random_spec(Seeded(seed), DOCUMENTED), Seeded(1000 + seed)
     data.setdefault("moulds", {}).update(pour=choose.pick(("open", "injected")), cavities=[1, 1])

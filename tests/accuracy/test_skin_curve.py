@@ -1,7 +1,5 @@
 """The curve's contact factors against finite elements made here; the suite's figures against the solver itself."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -17,7 +15,7 @@ from unitcad.validation import load
 
 @pytest.mark.parametrize("drive", ["flat", "axial"])
 @pytest.mark.parametrize("stuck", ["bonded", "resting"])
-def test_units_on_skin_lie_within_the_contact_s_factors(drive: str, stuck: str) -> None:
+def test_units_on_skin_lie_within_the_contact_s_factors(drive, stuck):
     """A unit of other silicones than those behind the factors, at another mesh."""
     pytest.importorskip("skfem")
     variant = estimate_input(load("embedded", ["layers.0.material=dragon-skin-10-medium"]))
@@ -31,7 +29,7 @@ def test_units_on_skin_lie_within_the_contact_s_factors(drive: str, stuck: str) 
         assert found[-1] < 1.4 * low[-1]  # the factors are no wider than the elements ask for
 
 
-def test_the_curve_and_the_ratio_have_contact_in_their_range() -> None:
+def test_the_curve_and_the_ratio_have_contact_in_their_range():
     variant = estimate_input(load("encapsulating"))
     block = layered_block(variant)["drives"]["flat"]["u"]
     ratio = crosstalk_ratio(variant, variant.diameter / 2 + 20e-3)
@@ -47,7 +45,7 @@ def test_the_curve_and_the_ratio_have_contact_in_their_range() -> None:
         assert (low[-2], low[-1]) == (1.0, CONTACT[drive][0][-1])
 
 
-def test_what_is_left_every_20_mm_is_that_of_the_solver() -> None:
+def test_what_is_left_every_20_mm_is_that_of_the_solver():
     """Of a half-space whose surface wave decays as exp(-a r)/sqrt(r) far out: the fall is exp(-20 mm a)."""
     variant = suite.forearm()
     r = 1e-3 * np.array(suite.FAR_MM)
@@ -56,7 +54,7 @@ def test_what_is_left_every_20_mm_is_that_of_the_solver() -> None:
     assert suite.far(variant, 50.0, "axial") == pytest.approx((size[-1] / size[0]) ** (1 / 3), rel=2e-3)
 
 
-def test_no_body_within_the_sources_holds_both_bands_under_a_flat_motor() -> None:
+def test_no_body_within_the_sources_holds_both_bands_under_a_flat_motor():
     """What the estimate says beyond 2 cm."""
     shares = suite.bodies_in_range(suite.forearm(), 30)
     assert shares["flat"][0] > 0.2
@@ -66,7 +64,7 @@ def test_no_body_within_the_sources_holds_both_bands_under_a_flat_motor() -> Non
     assert "far" not in layered_block(estimate_input(load("encapsulating", ["estimate.tissue=gel-50kpa"])))
 
 
-def test_each_published_number_has_its_caveat() -> None:
+def test_each_published_number_has_its_caveat():
     rows = list(suite.published(suite.forearm()))
     assert len(rows) == 9
     assert all(one.caveat for one in rows)

@@ -10,11 +10,15 @@ from typing import Any
 
 import pytest
 
+from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from unitcad.casting.procedure import Procedure, procedure
 from unitcad.checks import check_moulds
 from unitcad.checks.finding import MouldFinding
 from unitcad.errors import Refusal
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, cut, union
 
 Change = Callable[[Shape], Shape]
@@ -61,3 +65,10 @@ def notch(inner: float, outer: float, half: float = 1.7) -> float:
         return half * math.sqrt(r**2 - half**2) + r**2 * math.asin(half / r)
 
     return inside(outer) - inside(inner)
+
+
+def pockets_cast(array: Array) -> tuple[Procedure, Procedure]:
+    """The procedures of an array's only unit and of its sheet, all layers of 1 cm3."""
+    spec = MouldSet(array.unit)
+    unit = procedure(spec, [1000.0] * len(spec.plan.steps), 1000.0)
+    return unit, array_procedure(patch_moulds(array), [1000.0], 1000.0, {"units/encapsulating": unit})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
@@ -13,7 +12,7 @@ from tests.casting import test_bench_views as views_of
 from tests.casting.test_bench_views import hues
 from tests.casting.test_plates import lie_apart
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.casting.drawings import ARROW, GREASE
 from unitcad.casting.preparation import printing
@@ -29,12 +28,11 @@ ARRAYS = (PATCH, BAND, CURVED)
 
 def planned(*source: str) -> tuple[PatchMoulds, Procedure]:
     array = patch_moulds(load_array(source[0], list(source[1:])))
-    made = curved_procedure if source == CURVED else back_sheet_procedure
-    return array, made(array, [100.0] * len(array.plan.steps), 1000.0)
+    return array, array_procedure(array, [100.0] * len(array.plan.steps), 1000.0, {})
 
 
 @pytest.mark.parametrize("source", ARRAYS, ids=" ".join)
-def test_every_array_keeps_every_rule(source: tuple[str, ...]) -> None:
+def test_every_array_keeps_every_rule(source):
     assert broken_rules(planned(*source)[1]) == []
 
 
@@ -50,30 +48,28 @@ PLANTED = {
 
 
 @pytest.mark.parametrize(("source", "plant", "said"), PLANTED.values(), ids=PLANTED)
-def test_a_planted_fault_breaks_its_rule(
-    source: tuple[str, ...], plant: Callable[[Procedure], Procedure], said: str
-) -> None:
+def test_a_planted_fault_breaks_its_rule(source, plant, said):
     faults = broken_rules(plant(planned(*source)[1]))
     assert any(said in fault for fault in faults), faults
 
 
 @pytest.mark.parametrize("source", ARRAYS, ids=" ".join)
 @pytest.mark.parametrize("test", views_of.OF_EVERY_SET, ids=lambda test: test.__name__)
-def test_the_pictures_of_arrays(test: Callable[..., None], source: tuple[str, ...]) -> None:
+def test_the_pictures_of_arrays(test, source):
     test(source, planned)
 
 
-def test_no_step_needs_a_pin_where_the_base_has_pins() -> None:
+def test_no_step_needs_a_pin_where_the_base_has_pins():
     made = planned(*PATCH)[1]
     (cups_on,) = (step for step in made.preparation if "one pin stands off" in step.text)
     assert "pin" not in cups_on.required_tools
 
 
-def test_all_pieces_of_split_tools_lie_apart_on_the_bed() -> None:
+def test_all_pieces_of_split_tools_lie_apart_on_the_bed():
     lie_apart(planned(*BAND)[0])
 
 
-def test_pictures_of_a_curved_set_show_what_is_there() -> None:
+def test_pictures_of_a_curved_set_show_what_is_there():
     moulds, _ = planned(*CURVED)
     shown = views(moulds)
     names = [name for name, view in shown.items() if view.group == "curved"]
@@ -89,12 +85,12 @@ def test_pictures_of_a_curved_set_show_what_is_there() -> None:
     assert layer2 == {"pour2-lid-off", "peel"}
 
 
-def test_the_procedure_says_what_is_on_each_plate() -> None:
+def test_the_procedure_says_what_is_on_each_plate():
     first = " ".join(printing(planned(*BAND)[0], 1000.0).how)
     named = ("moulds/moulds-1.3mf with base piece 1", "moulds/moulds-2.3mf with", "cup 2 piece 2")
     places = [first.index(words) for words in named]
     assert all(one < other for one, other in pairwise(places))
 
 
-def test_a_patch_s_sheet_has_no_more_words_than_a_maker_reads() -> None:
+def test_a_patch_s_sheet_has_no_more_words_than_a_maker_reads():
     assert len(files(planned(*PATCH)[1])["casting.md"].split()) <= 1800

@@ -15,18 +15,18 @@ import pytest
 import trimesh
 from casting_rules import broken_rules
 
+from tests.arrays.made_arrays import pockets_cast
 from tests.report.test_glb import chunks
 from unitcad.arrays.array_file import array_hash, load_array
 from unitcad.arrays.array_page import patch_glb
-from unitcad.arrays.array_procedure import pocket_procedure
+from unitcad.arrays.arrayed import Arrayed
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore
-from unitcad.casting.procedure import procedure
 from unitcad.casting.steps import casting_summary, duration
 from unitcad.casting.views import picture_path, views
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.make import Progress
 from unitcad.pipeline.write import build as build_array
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered
@@ -59,12 +59,12 @@ def _contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
-def test_the_live_page_says_what_the_procedure_says(folder: Path) -> None:
+def test_the_live_page_says_what_the_procedure_says(folder):
     told = answered(Ask(what="moulds", text=(folder / "array.toml").read_text("utf-8")), Trusted([]))
     assert told.lines[:-1] == [*casting_summary(json.loads((folder / "casting.json").read_bytes()))]
 
 
-def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
+def test_the_folder_holds_units_patch_tools_and_procedure(folder):
     there = set(_contents(folder))
     assert there >= {
         "array.toml", "manifest.json", "casting.md", "casting.json", "bom.csv", "step1-section.svg",
@@ -80,12 +80,10 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
     assert manifest["check"]["findings"] == []
 
 
-def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
+def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up():
     """Nine units in two cavities: five castings of two pours each, then the sheet's pour."""
     array = load_array("forearm-pockets", ["moulds.cavities=[2, 1]"])
-    moulds, spec = patch_moulds(array), MouldSet(array.unit)
-    unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
-    made = pocket_procedure(moulds, 6000.0, 1000.0, {"units/encapsulating": unit})
+    unit, made = pockets_cast(array)
     used = {item.item: item.quantity for item in made.bill}
     assert (used["gloves"], used["mixing cups and sticks"]) == (5 * 2 + 1, 5 * 2 + 1)
     strips = next(item.quantity for item in unit.bill if item.item == "adhesive tape")
@@ -102,12 +100,12 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert broken_rules(made) == []
     steps = [*made.preparation, *made.pours[0].steps, *made.release, *made.assembly]
     drawn = {step.picture for step in steps} - {""}
-    assert drawn == {picture_path(name) for name in views(moulds)}
+    assert drawn == {picture_path(name) for name in views(patch_moulds(array))}
     assert "tray" in {item.item for item in made.bill}
     assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
 
 
-def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:
+def test_the_bench_page_speaks_of_the_sheet(folder):
     page = write_bench(folder)
     assert page is not None
     packed = re.search(r'id="data">([A-Za-z0-9+/=]*)</script>', page.read_text("utf-8"))
@@ -119,14 +117,18 @@ def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:
     assert wanted <= set(content["pictures"])
 
 
+def test_the_sheet_of_injected_units_is_struck_off_without_a_syringe():
+    unit, made = pockets_cast(load_array("forearm-pockets", ["moulds.pour=injected"]))
+    syringes = [next(item.quantity for item in each.bill if item.item == "syringe") for each in (unit, made)]
+    assert syringes == [2, 2]
+    assert not any("syringe" in figure.name for figure in made.pours[0].figures)
+
+
 @pytest.mark.parametrize(("count", "words"), [(1, "one casting in"), (2, "2 castings, one after the other, in")])
-def test_the_units_take_the_time_of_their_whole_time_line(count: int, words: str) -> None:
+def test_the_units_take_the_time_of_their_whole_time_line(count, words):
     """Two units, two cavities or one: the motors' time counts at the bench and in all, in words and in numbers."""
     array = load_array("forearm-pockets", [*SMALL, f"moulds.cavities=[{3 - count}, 1]"])
-    moulds = patch_moulds(array)
-    spec = MouldSet(array.unit)
-    unit = procedure(spec, [spec.solids[step.name].volume() for step in spec.plan.steps], 1000.0)
-    made = pocket_procedure(moulds, 1000.0, 1000.0, {"units/encapsulating": unit})
+    unit, made = pockets_cast(array)
     (step,) = [step for step in made.preparation if step.title == "Cast the units"]
     bench, whole = sum(phase.bench_min for phase in unit.time_line), unit.time_line[-1].end_min
     assert bench > unit.bench_min
@@ -136,12 +138,10 @@ def test_the_units_take_the_time_of_their_whole_time_line(count: int, words: str
     assert take in step.text
 
 
-def test_the_sheet_is_cast_while_the_units_first_pour_cures() -> None:
+def test_the_sheet_is_cast_while_the_units_first_pour_cures():
     """One casting of two units: Layer 1 cures for 4 h, in which the sheet is poured; neither waits for the other."""
     array = load_array("forearm-pockets", [*SMALL, "moulds.cavities=[2, 1]"])
-    spec = MouldSet(array.unit)
-    unit = procedure(spec, [spec.solids[step.name].volume() for step in spec.plan.steps], 1000.0)
-    made = pocket_procedure(patch_moulds(array), 1000.0, 1000.0, {"units/encapsulating": unit})
+    unit, made = pockets_cast(array)
     phases = {phase.name: phase for phase in made.time_line}
     first = next(phase for phase in unit.time_line if phase.name == "pour 1")
     begin = first.end_min - 60 * unit.pours[0].cure_h
@@ -153,20 +153,29 @@ def test_the_sheet_is_cast_while_the_units_first_pour_cures() -> None:
     assert f"while their first pour cures, {duration(begin)} from now" in made.preparation[0].text
 
 
-def test_the_same_input_gives_the_same_bytes_from_its_own_file(folder: Path, tmp_path: Path) -> None:
+def test_the_same_input_gives_the_same_bytes_from_its_own_file(folder, tmp_path):
     again = build_array(load_array(folder / "array.toml"), tmp_path)
     assert again.folder.name == folder.name
     assert _contents(again.folder) == _contents(folder)
 
 
-def test_the_hash_follows_the_array_and_not_its_name() -> None:
+def test_arrays_that_differ_only_in_their_places_share_no_moulds_in_a_store():
+    store, trays = MemoryStore(), []
+    for pitch in (20, 22):
+        array = load_array("forearm-pockets", [*SMALL, f"layout.pitch_mm={pitch}"])
+        (base, *_) = Arrayed(array).make(("moulds",), False, store, Progress()).manifest["parts"]
+        trays.append(base["bbox_mm"][3] - base["bbox_mm"][0])
+    assert trays[1] - trays[0] == pytest.approx(2)
+
+
+def test_the_hash_follows_the_array_and_not_its_name():
     array = load_array("forearm-pockets")
     assert array_hash(load_array("forearm-pockets", ["name='other'", "output.formats=['stl']"])) == array_hash(array)
     assert array_hash(load_array("forearm-pockets", ["sheet.margin_mm=4"])) != array_hash(array)
     assert array_hash(load_array("forearm-pockets", ["unit.diameter_mm=14.5"])) != array_hash(array)
 
 
-def test_the_procedure_names_every_place_and_weighs_all_units(folder: Path) -> None:
+def test_the_procedure_names_every_place_and_weighs_all_units(folder):
     casting = json.loads((folder / "casting.json").read_text())
     (together,) = casting["assembly"]
     for place in load_array("forearm-pockets", SMALL).places:
@@ -178,15 +187,17 @@ def test_the_procedure_names_every_place_and_weighs_all_units(folder: Path) -> N
     inner = sum(p["part_a_g"] for p in unit["pours"] if p["material"] == "ecoflex-00-10")
     assert bill["ecoflex-00-10 part A"] == pytest.approx(2 * inner)
     assert casting["earliest_finish_min"] > 2 * unit["earliest_finish_min"]
+    text = (folder / "casting.md").read_text("utf-8")
+    assert f"- at {duration(casting['earliest_finish_min'])}: units in (" in text, "not when the sheet is out"
 
 
-def test_the_array_file_in_the_folder_is_whole(folder: Path) -> None:
+def test_the_array_file_in_the_folder_is_whole(folder):
     data = tomllib.loads((folder / "array.toml").read_text())
     assert data["unit"]["layers"][0]["material"] == "ecoflex-00-10"
     assert load_array(folder / "array.toml") == load_array("forearm-pockets", SMALL)
 
 
-def test_a_back_sheet_is_written_as_step(tmp_path: Path, store: MemoryStore) -> None:
+def test_a_back_sheet_is_written_as_step(tmp_path, store):
     """The inner layers of all units are one body of as many solids, and both colours come back on all of them."""
     pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)
     import step_reader

@@ -19,16 +19,14 @@ from unitcad.errors import Refusal
 run = CliRunner()
 
 
-def test_arrays_are_listed() -> None:
+def test_arrays_are_listed():
     shown = json.loads(run.invoke(app, ["list", "arrays", "--json"]).stdout)["arrays"]
     assert list(shown) == list(array_templates())
     assert all(about for about in shown.values())
 
 
 @pytest.mark.parametrize("name", array_templates())
-def test_a_new_file_is_the_template_under_its_own_name(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_new_file_is_the_template_under_its_own_name(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = run.invoke(app, ["init", "mine", "--template", name])
     assert done.exit_code == 0, done.output
@@ -40,7 +38,7 @@ def test_a_new_file_is_the_template_under_its_own_name(
     assert any(line.startswith('printer = "fdm-0.4"') for line in offered)
 
 
-def test_the_schema_has_each_kind_of_layout() -> None:
+def test_the_schema_has_each_kind_of_layout():
     schema = json.loads(run.invoke(app, ["schema", "array"]).stdout)
     kinds = schema["$defs"]["AskedArray"]["properties"]["layout"]["oneOf"]
     assert {kind["$ref"].rpartition("/")[2] for kind in kinds} == {"GridTable", "HexTable", "RingTable", "ListTable"}
@@ -49,7 +47,7 @@ def test_the_schema_has_each_kind_of_layout() -> None:
         jsonschema.validate(tomllib.loads(path.read_text()), schema)
 
 
-def test_a_refusal_names_file_line_and_the_pitch_that_fits(tmp_path: Path) -> None:
+def test_a_refusal_names_file_line_and_the_pitch_that_fits(tmp_path):
     file = tmp_path / "near.toml"
     file.write_text(array_templates()["hex-19"].read_text().replace("pitch_mm = 20.0", "pitch_mm = 12.0"))
     with pytest.raises(Refusal) as refused:
@@ -61,7 +59,7 @@ def test_a_refusal_names_file_line_and_the_pitch_that_fits(tmp_path: Path) -> No
     assert refused.value.line is None
 
 
-def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
+def test_build_writes_an_array_and_its_page(tmp_path):
     options = [
         "--formats",
         "stl",
@@ -88,7 +86,7 @@ def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
     assert "1 unit on a sheet" in done.stderr
 
 
-def test_step_0_of_an_array_measures_each_unit_s_parts_and_its_command_builds_the_array(tmp_path: Path) -> None:
+def test_step_0_of_an_array_measures_each_unit_s_parts_and_its_command_builds_the_array(tmp_path):
     """Two kinds of units, one at a place of its own. A given value counts as measured, also the catalogue's own."""
     (tmp_path / "mixed.toml").write_text(
         'name = "mixed"\narray = "pockets"\nunit = "encapsulating"\n[[place]]\nat = "A1"\nunit = "motor-10mm"\n'

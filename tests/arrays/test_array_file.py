@@ -5,10 +5,10 @@ from __future__ import annotations
 import gc
 import math
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
 import unitcad
@@ -32,7 +32,7 @@ def _nearest(array: Array) -> list[float]:
 
 
 @pytest.mark.parametrize("name", array_templates())
-def test_a_template_settles_to_data_that_give_the_same_array(name: str) -> None:
+def test_a_template_settles_to_data_that_give_the_same_array(name):
     array = load_array(name)
     assert load_array(array.asked) == array
     assert load_array(msgspec.json.decode(msgspec.json.encode(array.asked))) == array
@@ -43,7 +43,7 @@ def test_a_template_settles_to_data_that_give_the_same_array(name: str) -> None:
     assert compound_kind(default_template()) is None
 
 
-def test_a_grid_has_rows_from_the_top_and_columns_along_x() -> None:
+def test_a_grid_has_rows_from_the_top_and_columns_along_x():
     array = _array({"kind": "grid", "columns": 3, "rows": 2, "pitch_mm": [20, 25]})
     assert [(p.name, p.x, p.y) for p in array.places] == [
         ("A1", -20, 12.5), ("A2", 0, 12.5), ("A3", 20, 12.5), ("B1", -20, -12.5), ("B2", 0, -12.5), ("B3", 20, -12.5),
@@ -52,7 +52,7 @@ def test_a_grid_has_rows_from_the_top_and_columns_along_x() -> None:
 
 
 @pytest.mark.parametrize(("rings", "count"), [(1, 7), (2, 19), (3, 37)])
-def test_a_hexagon_has_six_neighbours_at_the_pitch(rings: int, count: int) -> None:
+def test_a_hexagon_has_six_neighbours_at_the_pitch(rings, count):
     array = _array({"kind": "hex", "rings": rings, "pitch_mm": 21}, moulds={"bed_x_mm": 400, "bed_y_mm": 400})
     assert len(array.places) == count
     assert _nearest(array) == pytest.approx([21] * count, abs=2e-3)
@@ -60,7 +60,7 @@ def test_a_hexagon_has_six_neighbours_at_the_pitch(rings: int, count: int) -> No
     assert inner.count(6) == count - 6 * rings
 
 
-def test_a_ring_goes_once_round_the_limb() -> None:
+def test_a_ring_goes_once_round_the_limb():
     array = _array({"kind": "ring", "count": 4, "bands": 3, "band_pitch_mm": 50}, limb={"radius_mm": 40})
     assert len(array.places) == 12
     assert array.radius_mm == 40
@@ -70,7 +70,7 @@ def test_a_ring_goes_once_round_the_limb() -> None:
     assert array.placed("A1").y - array.placed("B1").y == 50
 
 
-def test_listed_points_keep_their_distances() -> None:
+def test_listed_points_keep_their_distances():
     points = [[0, 0], [25, 3], [7, 31]]
     array = _array({"kind": "list", "points_mm": points})
     for (p, a), (q, b) in combinations(zip(points, array.places, strict=True), 2):
@@ -109,7 +109,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("change", "field", "nearest"), REFUSED, ids=lambda value: str(value)[:40])
-def test_what_does_not_fit_is_refused_with_what_does(change: dict[str, Any], field: str, nearest: object) -> None:
+def test_what_does_not_fit_is_refused_with_what_does(change, field, nearest):
     with pytest.raises(Refusal) as refused:
         _array(**{"layout": _GRID, **change})
     assert (refused.value.field, refused.value.nearest) == (field, nearest)
@@ -117,7 +117,7 @@ def test_what_does_not_fit_is_refused_with_what_does(change: dict[str, Any], fie
 
 @pytest.mark.parametrize("rows", [1, 2])
 @pytest.mark.parametrize("columns", [1, 2])
-def test_corners_that_meet_are_drawn(columns: int, rows: int) -> None:
+def test_corners_that_meet_are_drawn(columns, rows):
     array = _array({"kind": "grid", "columns": columns, "rows": rows, "pitch_mm": 20})
     x0, y0, x1, y1 = array.sheet.outline
     radius = array.sheet.corner_mm
@@ -126,17 +126,17 @@ def test_corners_that_meet_are_drawn(columns: int, rows: int) -> None:
     assert rounded(array.sheet.outline, radius, 1.0).area > area
 
 
-def test_tails_keep_clear_of_units_and_each_other() -> None:
+def test_tails_keep_clear_of_units_and_each_other():
     array = load_array("forearm-pockets")
-    drawn = [t for i, p in enumerate(array.places) for t in tails(p.unit, p.x, p.y, p.angle_deg, i)]
-    for tail in drawn:
-        steps = [(tail.x0 + s / 200 * (tail.x1 - tail.x0), tail.y0 + s / 200 * (tail.y1 - tail.y0)) for s in range(201)]
+    drawn = [(i, tail) for i, p in enumerate(array.places) for tail in tails(p, p.angle_deg)]
+    for owner, tail in drawn:
+        steps = np.linspace(tail.start, tail.end, 201)
         for i, place in enumerate(array.places):
-            if i != tail.owner:
-                assert min(math.dist(step, (place.x, place.y)) for step in steps) > place.radius + tail.half
+            if i != owner:
+                assert np.hypot(*(steps - (place.x, place.y)).T).min() > place.radius + tail.half
 
 
-def test_a_place_may_hold_another_unit_in_pockets() -> None:
+def test_a_place_may_hold_another_unit_in_pockets():
     other = {"like": default_template(), "diameter_mm": 16}
     array = _array(_GRID, place=[{"at": [1, 1], "unit": other, "angle_deg": 135}])
     assert [unit.diameter_mm for unit in array.units] == [16, 14]
@@ -144,7 +144,7 @@ def test_a_place_may_hold_another_unit_in_pockets() -> None:
     assert array.placed("A2").unit.diameter_mm == 14
 
 
-def test_a_unit_file_lies_beside_the_array_file(tmp_path: Path) -> None:
+def test_a_unit_file_lies_beside_the_array_file(tmp_path):
     (tmp_path / "mine.toml").write_text(
         templates()[default_template()].read_text("utf-8").replace("diameter_mm = 14.0", "diameter_mm = 15.0")
     )
@@ -157,7 +157,7 @@ def test_a_unit_file_lies_beside_the_array_file(tmp_path: Path) -> None:
     assert load(array.asked["unit"]) == array.unit
 
 
-def test_no_table_lets_the_decoder_read_beyond_its_memory() -> None:
+def test_no_table_lets_the_decoder_read_beyond_its_memory():
     """A union of a fixed tuple and of numbers or texts with limits makes msgspec read other limits."""
     data = expand({"name": "a", "array": "pockets", "unit": default_template(), "layout": _GRID})
     for _ in range(3):
@@ -167,7 +167,7 @@ def test_no_table_lets_the_decoder_read_beyond_its_memory() -> None:
         gc.collect()
 
 
-def test_python_takes_changes_as_a_dict_and_load_refuses_arrays() -> None:
+def test_python_takes_changes_as_a_dict_and_load_refuses_arrays():
     array = load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
     assert array.places[1].x - array.places[0].x == 25
     for source in ("forearm-pockets", {"array": "pockets"}):

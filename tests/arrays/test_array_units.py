@@ -29,14 +29,14 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_like_is_changed_and_the_other_keys_of_the_file_stay(file: Path) -> None:
+def test_like_is_changed_and_the_other_keys_of_the_file_stay(file):
     assert load_array(file).unit.design == "embedded"
     unit = load_array(file, ["unit.like=encapsulating"]).unit
     assert (unit.design, unit.diameter_mm) == ("encapsulating", 15)
 
 
 @pytest.mark.parametrize("changes", [["unit=three-layer"], ['unit={like="three-layer"}'], ["unit.like=three-layer"]])
-def test_a_unit_by_name_is_changed_by_paths(changes: list[str]) -> None:
+def test_a_unit_by_name_is_changed_by_paths(changes):
     tail = "unit.fpcb.tail_length_mm=5.6"
     one, other = (load_array("hex-19", order) for order in ([*changes, tail], [tail, *changes]))
     assert len(one.unit.layers) == 3
@@ -45,7 +45,7 @@ def test_a_unit_by_name_is_changed_by_paths(changes: list[str]) -> None:
     assert one.asked == other.asked
 
 
-def test_a_place_takes_like_too() -> None:
+def test_a_place_takes_like_too():
     whole = load_array("hex-19", ['place=[{at="A1", unit={like="encapsulating", diameter_mm=13}}]'])
     assert whole.placed("A1").unit.diameter_mm == 13
     parts = ["place.0.unit.diameter_mm=13", 'place=[{at="A1"}]', "place.0.unit.like=encapsulating"]
@@ -61,14 +61,14 @@ def test_a_place_takes_like_too() -> None:
         ("unit=nope.toml", "unit", "there is no file nope.toml"),
     ],
 )
-def test_a_unit_that_is_not_found_is_refused_with_its_field(change: str, field: str, words: str) -> None:
+def test_a_unit_that_is_not_found_is_refused_with_its_field(change, field, words):
     with pytest.raises(Refusal) as refused:
         load_array("hex-19", [change])
     assert refused.value.field == field
     assert words in refused.value.limit
 
 
-def test_an_array_refuses_a_unit_without_a_motor(tmp_path: Path) -> None:
+def test_an_array_refuses_a_unit_without_a_motor(tmp_path):
     (tmp_path / "disc.stl").write_bytes(printing.stl(*arrays(realise(cylinder(7, 0, 4), 96)), "disc"))
     layer = '[[layers]]\nmaterial = "ecoflex-00-30"\nwall_mm = 3.0\n'
     text = f'name = "disc"\ndesign = "disc.stl"\ndiameter_mm = 14.0\nmotor = false\n{layer}'

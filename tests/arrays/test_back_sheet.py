@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.arrays.made_arrays import Change, findings, less, made, more, notch, with_tool
-from tests.moulds.faulty_sets import mesh_findings
+from tests.arrays.made_arrays import Change, less, made, more, notch, with_tool
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import mould_checks
@@ -16,32 +15,8 @@ from unitcad.errors import Refusal
 from unitcad.moulds.pieces import Removal
 from unitcad.shape import box, cut, cylinder, moved
 
-VARIANTS = [
-    (),
-    ("unit=three-layer", "layout.pitch_mm=24"),
-    ("unit=single-encapsulating", "moulds.printer=fdm-0.25"),
-    ("layout.columns=1", "layout.pitch_mm=18"),
-    ("layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.printer=fdm-0.25", "sheet.thickness_mm=1.5"),
-    ("sheet.thickness_mm=0.6", "circuit.row_width_mm=2", "layout.pitch_mm=[18,19]", "sheet.margin_mm=7"),
-    # Grooves side by side: 0.4 mm apart, and where fins cut what two of them share.
-    ("layout.rows=2", "layout.columns=2", "layout.pitch_mm=[20.66,20.2]", "moulds.land_mm=2.88"),
-]
 
-
-@pytest.mark.parametrize("overrides", VARIANTS, ids=[" ".join(v) for v in VARIANTS])
-def test_every_mould_check_holds(overrides: tuple[str, ...]) -> None:
-    found = findings("forearm-patch", *overrides)
-    assert [f for f in found if not f.ok] == []
-    assert {f.code for f in found} == set(mould_checks())
-    assert max(f.value for f in found if f.code == "C100") < 1e-6
-
-
-@pytest.mark.parametrize("overrides", VARIANTS[:4], ids=[" ".join(v) for v in VARIANTS[:4]])
-def test_every_tool_prints_without_support(overrides: tuple[str, ...]) -> None:
-    assert mesh_findings(made("forearm-patch", *overrides)) == []
-
-
-def test_the_silicone_has_the_volume_of_its_lengths() -> None:
+def test_the_silicone_has_the_volume_of_its_lengths():
     """Twelve notches, 3.4 wide and 2.11 high, in nine rings; the sheet 76 x 60 x 1.25, corners of 10, two slots."""
     moulds = made("forearm-patch")
     layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
@@ -54,7 +29,7 @@ def test_the_silicone_has_the_volume_of_its_lengths() -> None:
     assert layer1 == pytest.approx(inner, rel=2e-3)
 
 
-def test_a_cup_goes_on_the_pins_in_one_attitude_only() -> None:
+def test_a_cup_goes_on_the_pins_in_one_attitude_only():
     pins = made("forearm-patch").plan.pins
     assert pins is not None
     turned = {(-x, -y) for x, y in pins.places}
@@ -66,17 +41,11 @@ def test_a_cup_goes_on_the_pins_in_one_attitude_only() -> None:
 FAULTS: list[tuple[str, str, str, Change]] = [
     ("C230", "cup1", "a pin's hole into a groove", less(moved(cylinder(2.15, -1, 2.5), 0, 7.5))),
     ("C230", "cup2", "a pin's hole into the groove", less(moved(cylinder(2.15, -1, 3.7), 10, 31.75))),
-    ("C230", "cup2", "a pin's hole 0.6 under the groove", less(moved(cylinder(2.15, -1, 3.0), 10, 31.75))),
-    ("C000", "cup2", "a pin's hole through the rim", less(moved(cylinder(2.15, -1, 9), 0, 35.45))),
     ("C240", "cup2", "a pin's hole 0.5 from a bore", less(moved(cylinder(2.15, -1, 2.4), 0, 29.6))),
     ("C210", "base", "a pin 0.1 too thick", more(moved(cylinder(2.1, 0, 1.5), 23.2, -35.45))),
     ("C210", "base", "a fin 0.1 too wide", more(box(-15, -12.5, -1.8, 1.8, 0, 2.11))),
-    ("C220", "cup1", "holes and slots too wide", less(box(-99, 99, -99, 99, -1, 1.5))),
     ("C100", "base", "a fin 0.2 low", less(box(-15, -12.5, -2, 2, 1.91, 3))),
-    ("C100", "base", "no core", less(cylinder(4.6, 0, 3))),
-    ("C100", "cup2", "a scratch over the land", less(box(-1, 1, 29, 32, 4.3, 9))),
     ("C200", "base", "a fin longer than its slot", more(box(-12, -11.4, -1.7, 1.7, 0, 2.11))),
-    ("C200", "base", "a pin higher than its hole", more(moved(cylinder(1.5, 0, 2.6), 23.2, -35.45))),
     ("C300", "base", "a knob on a core", more(moved(cylinder(4.7, 1.0, 1.4), 20, 20))),
     ("C300", "cup2", "a lip in a bore", more(box(-7.2, -6.9, -1, 1, 2.5, 2.8))),
     ("C310", "base", "a core into the cap, which has no hole for it", more(cylinder(3, 0, 2.31))),
@@ -85,12 +54,12 @@ FAULTS: list[tuple[str, str, str, Change]] = [
 
 
 @pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
-def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Change) -> None:
+def test_a_planted_fault_is_caught(code, tool, what, change):
     found = mould_checks()[code].findings(with_tool(made("forearm-patch"), tool, change))
     assert not all(f.ok for f in found), what
 
 
-def test_an_impossible_order_is_caught() -> None:
+def test_an_impossible_order_is_caught():
     """Cup 2 lifted, or the patch pushed out over the fins before the base is off."""
     moulds = made("forearm-patch")
     plan, last = moulds.plan, moulds.plan.steps[-1]
@@ -104,7 +73,7 @@ def test_an_impossible_order_is_caught() -> None:
         assert not all(f.ok for f in found)
 
 
-def test_corners_of_the_circuit_that_reach_into_silicone_are_refused_before_they_overlap() -> None:
+def test_corners_of_the_circuit_that_reach_into_silicone_are_refused_before_they_overlap():
     data = {"name": "hex", "array": "back-sheet", "unit": "encapsulating"}
     data |= {"layout": {"kind": "hex", "rings": 2, "pitch_mm": 21.04}}
     overlaps = mould_checks()["C200"].findings

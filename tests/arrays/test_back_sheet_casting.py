@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import back_sheet_procedure
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.drawings import HELD, TAPE_WIDTH, tape_places
 from unitcad.casting.procedure import Procedure
@@ -20,10 +20,10 @@ from unitcad.shape.lettering import seen
 @pytest.fixture(scope="module")
 def made() -> Procedure:
     moulds = patch_moulds(load_array("forearm-patch"))
-    return back_sheet_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0)
+    return array_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0, {})
 
 
-def test_the_base_comes_off_before_the_patch_is_pushed_out(made: Procedure) -> None:
+def test_the_base_comes_off_before_the_patch_is_pushed_out(made):
     assert [step.title for step in made.release] == ["Filament out", "Base off, downwards", "Push out"]
     titles = [[step.title for step in pour.steps] for pour in made.pours]
     assert titles[0][-1] == "Cup 1 off"
@@ -32,14 +32,14 @@ def test_the_base_comes_off_before_the_patch_is_pushed_out(made: Procedure) -> N
     assert "Leave cup 2 on" in made.release[1].text
 
 
-def test_the_silicone_of_all_units_is_mixed_once(made: Procedure) -> None:
+def test_the_silicone_of_all_units_is_mixed_once(made):
     """1.91 g of Layer 1 for nine units; 7.35 g of Layer 2 and sheet (6.87 cm3 of 1.07 g/cm3)."""
     net = [next(f.value for f in pour.figures if f.name == "in the cavities, net") for pour in made.pours]
     assert net == [pytest.approx(1.90, abs=0.02), pytest.approx(7.35, abs=0.02)]
     assert any("1.90 + 7.35 = 9.25 g" in line for line in made.measure)
 
 
-def test_every_step_has_its_own_title_and_what_joins_all_units_counts_once(made: Procedure) -> None:
+def test_every_step_has_its_own_title_and_what_joins_all_units_counts_once(made):
     assert [step.title for step in made.assembly] == [
         "Solder the motors",
         "Lay the circuit in",
@@ -56,7 +56,7 @@ def test_every_step_has_its_own_title_and_what_joins_all_units_counts_once(made:
     assert "The sheet: 76.00 x 60.00 mm" in " ".join(made.measure)
 
 
-def test_the_words_name_marks_faces_and_lengths_of_this_set(made: Procedure) -> None:
+def test_the_words_name_marks_faces_and_lengths_of_this_set(made):
     """Layer 1 is 5.5 mm in radius, the unit 7, a fin ends 1.2 mm outside it; the plate under 2.11 mm of core is 4."""
     sort = made.preparation[0].text
     assert f"b{seen(made.label)} on the base" in sort
@@ -75,7 +75,7 @@ def test_the_words_name_marks_faces_and_lengths_of_this_set(made: Procedure) -> 
     assert all("in the middle of" in text and "towards that corner" not in text for text in on)
 
 
-def test_each_piece_of_a_long_tool_is_held_down() -> None:
+def test_each_piece_of_a_long_tool_is_held_down():
     """A strip of tape for each 60 mm, and one between any two seams of base and cups, clear of the filaments."""
     moulds = patch_moulds(load_array("wrist-band"))
     places, half = tape_places(moulds), moulds.plan.layout.cup[0]
@@ -84,7 +84,7 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
         assert any(low <= at and at + TAPE_WIDTH <= high for at in places)
     for cell in moulds.plan.layout.cells:
         assert all(not at < cell.x < at + TAPE_WIDTH for at in places)
-    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
+    made = array_procedure(moulds, [100.0] * 2, 1000.0, {})
     hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
     assert len(places) >= 2 * half / HELD
     assert f"run {len(places)} strips of tape from" in hold
@@ -96,17 +96,17 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
     assert tape.quantity == 2 * 2 * len(places)
 
 
-def test_a_pour_that_outlasts_its_pot_life_is_warned_of() -> None:
+def test_a_pour_that_outlasts_its_pot_life_is_warned_of():
     """144 cavities take half a minute each; nine do not."""
     large = load_array("forearm-patch", ["layout.columns=12", "layout.rows=12"])
     for array, late in ((large, True), (load_array("forearm-patch"), False)):
         moulds = patch_moulds(array)
-        pours = back_sheet_procedure(moulds, [100.0] * 2, 1000.0).pours
+        pours = array_procedure(moulds, [100.0] * 2, 1000.0, {}).pours
         warned = list(pour_warnings([asdict(pour) for pour in pours]))
         assert [line.split(" in pour")[0] for line in warned] == ["mixing and pouring outlast the pot life"] * late
 
 
-def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
+def test_agent_goes_into_the_last_cup_alone(made):
     """Nothing bonds to the sheet's skin side; Layer 1 and the core's face bond later."""
     assert [[(face.tool, face.face) for face in pour.agent] for pour in made.pours] == [[], [("cup2", "bore")]]
     on = [next(step.text for step in pour.steps if step.title.endswith(" on")) for pour in made.pours]

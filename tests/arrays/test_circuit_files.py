@@ -72,7 +72,7 @@ def _inside(profile: Profile, at: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_the_outline_holds_pads_and_strips_and_rounds_what_lies_between(name: str) -> None:
+def test_the_outline_holds_pads_and_strips_and_rounds_what_lies_between(name):
     """A point is outside exactly where a disc of the corner's radius fits that keeps clear of pads and strips."""
     array = ARRAYS[name]
     laid, drawn = wiring(array), outline(array)
@@ -97,7 +97,7 @@ def test_the_outline_holds_pads_and_strips_and_rounds_what_lies_between(name: st
     assert np.any(inside[between])
 
 
-def test_a_corner_that_reaches_into_a_units_wall_is_refused_with_what_fits() -> None:
+def test_a_corner_that_reaches_into_a_units_wall_is_refused_with_what_fits():
     array = load_array(ARRAYS["grid"], ["circuit.corner_mm=4.0"])
     with pytest.raises(Refusal, match="notch") as refused:
         outline(array)
@@ -106,7 +106,7 @@ def test_a_corner_that_reaches_into_a_units_wall_is_refused_with_what_fits() -> 
     outline(load_array(array, [f"circuit.corner_mm={refused.value.nearest}"]))
 
 
-def test_the_dxf_holds_the_outline_exactly_and_has_the_same_bytes_again() -> None:
+def test_the_dxf_holds_the_outline_exactly_and_has_the_same_bytes_again():
     array = ARRAYS["hexagon"]
     laid, drawn = wiring(array), outline(array)
     data = circuit_dxf(laid, drawn)
@@ -127,7 +127,7 @@ def test_the_dxf_holds_the_outline_exactly_and_has_the_same_bytes_again() -> Non
     assert not ezdxf.options.write_fixed_meta_data_for_testing
 
 
-def test_the_kicad_board_has_one_closed_edge() -> None:
+def test_the_kicad_board_has_one_closed_edge():
     array = ARRAYS["grid"]
     drawn = outline(array)
     text = kicad_board(wiring(array), drawn).decode()
@@ -147,7 +147,7 @@ def test_the_kicad_board_has_one_closed_edge() -> None:
         assert a * b * c / 4 / area == pytest.approx(radius, rel=1e-3)
 
 
-def test_svg_and_table_name_every_motor() -> None:
+def test_svg_and_table_name_every_motor():
     array = ARRAYS["turned"]
     laid = wiring(array)
     svg = circuit_svg(laid, outline(array))
@@ -160,11 +160,11 @@ def test_svg_and_table_name_every_motor() -> None:
     assert float(rows[-1]["x_mm"]) == pytest.approx(laid.end[0], abs=1e-4)
 
 
-def test_the_body_is_as_thick_as_the_units_circuits() -> None:
+def test_the_body_is_as_thick_as_the_units_circuits():
     body = circuit_body(ARRAYS["grid"])
     assert exact_volume(body.shape) == pytest.approx(outline(ARRAYS["grid"]).area * (mm(2.11) - 2.0), rel=1e-9)
 
 
-def test_the_step_file_has_the_outlines_volume() -> None:
+def test_the_step_file_has_the_outlines_volume():
     step = pytest.importorskip("unitcad.export.step")
     assert b"CYLINDRICAL_SURFACE" in step.content([circuit_body(ARRAYS["grid"])], "circuit")

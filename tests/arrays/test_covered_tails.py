@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from casting_rules import broken_rules
 
+from tests.arrays.made_arrays import pockets_cast
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import pocket_procedure
-from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.sheet import rounded
 from unitcad.arrays.tails import MOST_NAMES, covered_tails, covered_tails_warning, tail_half_width, tail_length
-from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build as build_array
 from unitcad.report import write_report
 from unitcad.shape import Extrude, box, moved, rotated
@@ -27,7 +23,7 @@ SIDES = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 8]", "uni
 TURNED = [{"at": "A3", "angle_deg": 0}, {"at": "C1", "angle_deg": 180}, {"at": "C3", "angle_deg": 0}]
 
 
-def test_tails_of_the_template_come_out_where_a_quarter_turn_lets_them() -> None:
+def test_tails_of_the_template_come_out_where_a_quarter_turn_lets_them():
     array = load_array("forearm-pockets")
     assert [place.angle_deg for place in array.places] == [90, 90, 90, 45, 45, 225, 270, 270, 270]
     assert [(tail.place, bool(tail.blocked_by), tail.angle_deg) for tail in covered_tails(array)] == [
@@ -35,7 +31,7 @@ def test_tails_of_the_template_come_out_where_a_quarter_turn_lets_them() -> None
     ]
 
 
-def test_a_tail_that_comes_out_at_another_angle_is_told_it() -> None:
+def test_a_tail_that_comes_out_at_another_angle_is_told_it():
     array = load_array("forearm-pockets", {"place": TURNED})
     covered = {tail.place: tail for tail in covered_tails(array)}
     # The ends lie at 20 + 7 + 10 = 37 mm, the sheet's edge at 38.
@@ -53,7 +49,7 @@ def test_a_tail_that_comes_out_at_another_angle_is_told_it() -> None:
 
 
 @pytest.mark.parametrize("name", ["forearm-pockets", "hex-19"])
-def test_a_tail_longer_by_so_much_has_its_end_out_of_the_sheet(name: str) -> None:
+def test_a_tail_longer_by_so_much_has_its_end_out_of_the_sheet(name):
     """Against solids: a slice across the tail meets the sheet before that length and misses it beyond."""
     array = load_array(name)
     plan = realise(Extrude(rounded(array.sheet.outline, array.sheet.corner_mm), -1, 1), 256)
@@ -70,7 +66,7 @@ def test_a_tail_longer_by_so_much_has_its_end_out_of_the_sheet(name: str) -> Non
         assert not meets(end + 0.02)
 
 
-def test_what_is_said_to_help_helps_and_what_is_blocked_is_refused() -> None:
+def test_what_is_said_to_help_helps_and_what_is_blocked_is_refused():
     longer = covered_tails(load_array("forearm-pockets", ["unit.fpcb.tail_length_mm=11"]))
     assert [tail.place for tail in longer] == ["B1", "B2", "B3"]
     middle = next(tail for tail in longer if tail.place == "B2")
@@ -78,12 +74,12 @@ def test_what_is_said_to_help_helps_and_what_is_blocked_is_refused() -> None:
         load_array("forearm-pockets", [f"unit.fpcb.tail_length_mm={middle.length_mm}"])
 
 
-def test_nothing_is_hidden_by_a_sheet_under_the_tails_or_where_one_circuit_serves_all() -> None:
+def test_nothing_is_hidden_by_a_sheet_under_the_tails_or_where_one_circuit_serves_all():
     assert covered_tails(load_array("forearm-pockets", ['unit="single-embedded"', "sheet.thickness_mm=1.2"])) == ()
     assert covered_tails(load_array("forearm-patch")) == ()
 
 
-def test_a_warning_names_some_places_and_counts_the_others() -> None:
+def test_a_warning_names_some_places_and_counts_the_others():
     array = load_array("hex-19", ["layout.rings=4"])
     covered, (said,) = covered_tails(array), covered_tails_warning(array)
     stopped = sum(bool(tail.blocked_by) for tail in covered)
@@ -91,13 +87,11 @@ def test_a_warning_names_some_places_and_counts_the_others() -> None:
     assert f"and {stopped - MOST_NAMES} others." in said
 
 
-def test_procedure_manifest_and_page_say_what_to_do(tmp_path: Path) -> None:
+def test_procedure_manifest_and_page_say_what_to_do(tmp_path):
     array = load_array("forearm-pockets", SIDES)
     covered = covered_tails(array)
     assert covered
-    spec = MouldSet(array.unit)
-    unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
-    made = pocket_procedure(patch_moulds(array), 1000.0, 1000.0, {"units/encapsulating": unit})
+    _, made = pockets_cast(array)
     wires, units_in = made.assembly
     assert (wires.title, units_in.title) == ("Wires on covered tails", "Units in")
     assert all(tail.place in wires.text for tail in covered)

@@ -17,8 +17,8 @@ from unitcad.arrays.crosstalk import (
     crosstalk,
     crosstalk_csv,
     crosstalk_lines,
+    distances,
     heat_map_svg,
-    pairs,
     patch_map_svg,
 )
 from unitcad.attenuation import UniformDisc
@@ -54,7 +54,7 @@ def _scattered(seed: int, count: int, other: str = "") -> Array:
 
 
 @pytest.mark.parametrize(("seed", "other"), [(1, ""), (2, "motor-10mm"), (3, "single-embedded")])
-def test_every_pair_is_what_the_solver_gives_it_alone(seed: int, other: str) -> None:
+def test_every_pair_is_what_the_solver_gives_it_alone(seed, other):
     """The motion as a vector: two forces in quadrature along x and y, each component in Cartesian axes."""
     made = _scattered(seed, 7, other)
     data = crosstalk(made, band=())
@@ -92,7 +92,7 @@ def test_every_pair_is_what_the_solver_gives_it_alone(seed: int, other: str) -> 
                     assert data["matrix"][drive][target][i][j] == pytest.approx(size[0] / size[1], abs=1e-3)
 
 
-def test_the_middle_of_ten_by_ten_is_as_once_worked_out() -> None:
+def test_the_middle_of_ten_by_ten_is_as_once_worked_out():
     """|u_z| of an axial drive at 16 mm and 125 Hz: 2.5 edge levels in phase, 0.73 as the root of the squares' sum."""
     data = crosstalk(grid(10, 10, 16.0), band=())
     middle = [place["name"] for place in data["places"]].index("E5")
@@ -103,7 +103,7 @@ def test_the_middle_of_ten_by_ten_is_as_once_worked_out() -> None:
     assert data["worst"]["place"] == "E5"
 
 
-def test_sums_are_those_of_the_matrix() -> None:
+def test_sums_are_those_of_the_matrix():
     matrix = np.array(DATA["matrix"]["flat"]["centre"], float)
     for j in range(9):
         column = [matrix[i, j] for i in range(9) if i != j]
@@ -114,7 +114,7 @@ def test_sums_are_those_of_the_matrix() -> None:
     assert DATA["worst"]["sum"]["value"] == DATA["sums"]["flat"]["sum"][4]
 
 
-def test_the_nearest_neighbour_is_the_ratio_of_two_units_with_its_range() -> None:
+def test_the_nearest_neighbour_is_the_ratio_of_two_units_with_its_range():
     alone = crosstalk_ratio(estimate_input(NINE.unit), 20e-3)
     nearest = DATA["nearest"]
     assert nearest["distance_mm"] == 20
@@ -124,7 +124,7 @@ def test_the_nearest_neighbour_is_the_ratio_of_two_units_with_its_range() -> Non
     assert nearest["centre"]["value"] < nearest["nearest_edge"]["value"] < 1
 
 
-def test_absolute_values_are_only_a_range() -> None:
+def test_absolute_values_are_only_a_range():
     answer = estimate_spec(NINE.unit)["answer"]
     absolute = DATA["absolute"]
     assert set(absolute["sum"]) == {"low", "high"}
@@ -134,17 +134,17 @@ def test_absolute_values_are_only_a_range() -> None:
         assert absolute[key] == pytest.approx(expected, rel=1e-3)
 
 
-def test_round_a_limb_distances_are_arcs_and_the_ends_of_a_ring_are_neighbours() -> None:
+def test_round_a_limb_distances_are_arcs_and_the_ends_of_a_ring_are_neighbours():
     ring = array({"kind": "ring", "count": 8}, limb={"radius_mm": 40.0})
     arc = 2 * math.pi * 40 / 8
-    found = pairs(ring).centre
+    found = distances(ring)[0]
     assert found[0, 7] == pytest.approx(arc, abs=2e-3)
     assert found[0, 4] == pytest.approx(4 * arc, abs=2e-3)
     assert found.max() <= math.pi * 40 + 1e-3
     assert "arc" in crosstalk(ring, band=())["distances"]
 
 
-def test_masses_are_those_of_a_row_that_was_worked_out_unit_by_unit() -> None:
+def test_masses_are_those_of_a_row_that_was_worked_out_unit_by_unit():
     row = grid(3, 1, 18.0)
     variant = estimate_input(row.unit)
     block = neighbours_block([variant] * 3, 18e-3, [variant.frequency.middle])
@@ -158,19 +158,19 @@ def test_masses_are_those_of_a_row_that_was_worked_out_unit_by_unit() -> None:
     assert second["masses_change_it_by"] > 0
 
 
-def test_more_units_than_their_masses_can_be_worked_out_for_are_refused() -> None:
+def test_more_units_than_their_masses_can_be_worked_out_for_are_refused():
     with pytest.raises(Refusal, match=str(MOST_LOADED)):
         crosstalk(grid(11, 10, 20.0), band=(), masses=True)
 
 
-def test_units_on_two_bodies_or_without_an_estimate_are_refused() -> None:
+def test_units_on_two_bodies_or_without_an_estimate_are_refused():
     place = [{"at": "A2", "unit": {**UNIT, "estimate": {"tissue": "gel-50kpa"}}}]
     with pytest.raises(Refusal) as refused:
         crosstalk(grid(2, 1, 20.0, place=place))
     assert refused.value.field == "estimate.tissue"
 
 
-def test_a_single_unit_has_no_neighbour() -> None:
+def test_a_single_unit_has_no_neighbour():
     single = grid(1, 1, 20.0)
     data = crosstalk(single)
     assert data["nearest"] is None
@@ -181,7 +181,7 @@ def test_a_single_unit_has_no_neighbour() -> None:
         assert "nan" not in svg
 
 
-def test_the_table_holds_the_matrix_and_the_band() -> None:
+def test_the_table_holds_the_matrix_and_the_band():
     rows = list(csv.DictReader(io.StringIO(crosstalk_csv(NINE).decode())))
     assert len(rows) == 72
     names = [place["name"] for place in DATA["places"]]
@@ -196,7 +196,7 @@ def test_the_table_holds_the_matrix_and_the_band() -> None:
     assert crosstalk_csv(NINE) == crosstalk_csv(load_array(NINE.asked))
 
 
-def test_the_heat_map_shows_every_pair_and_the_map_every_unit() -> None:
+def test_the_heat_map_shows_every_pair_and_the_map_every_unit():
     svg = heat_map_svg(DATA)
     texts = [text.text for text in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")]
     assert texts.count("35") == 24
@@ -206,10 +206,9 @@ def test_the_heat_map_shows_every_pair_and_the_map_every_unit() -> None:
     drawn = ElementTree.fromstring(patch)
     assert len(list(drawn.iter("{http://www.w3.org/2000/svg}circle"))) == 9
     assert "<title>circuit</title>" in patch
-    assert "A1" in patch_map_svg(NINE)
 
 
-def test_eight_units_round_a_limb_get_alike_and_the_middle_of_a_grid_gets_the_most() -> None:
+def test_eight_units_round_a_limb_get_alike_and_the_middle_of_a_grid_gets_the_most():
     """Symmetry: what differs is what the centres are rounded to."""
     assert "With all other units on, all get alike: 0.22" in " ".join(
         crosstalk_lines(crosstalk(load_array("wrist-band")))

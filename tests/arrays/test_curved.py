@@ -8,10 +8,8 @@ from functools import partial
 
 import pytest
 
-from tests.arrays.made_arrays import Change, findings, less, made, more, notch, refusal_of, with_tool
-from tests.moulds.faulty_sets import broken, mesh_findings
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import curved_procedure
+from tests.arrays.made_arrays import Change, less, made, more, notch, refusal_of, with_tool
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
 from unitcad.checks import mould_checks
@@ -26,42 +24,7 @@ pair = partial(sleeve, "layout.columns=2", "layout.rows=1")
 """Two units side by side: what is quick to judge."""
 
 
-def test_every_mould_check_holds() -> None:
-    found = findings("sleeve-curved")
-    assert [f for f in found if not f.ok] == []
-    assert {f.code for f in found} == set(mould_checks())
-    assert max(f.value for f in found if f.code == "C100") < 1e-6
-
-
-HEX = {
-    "name": "hex",
-    "array": "back-sheet",
-    "unit": "encapsulating",
-    "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20},
-    "circuit": {"row_width_mm": 2},
-    "limb": {"radius_mm": 45, "cast": "curved"},
-}
-SLOTS = {
-    "name": "slots",
-    "array": "back-sheet",
-    "unit": {"like": "three-layer"},
-    "layout": {"kind": "list", "points_mm": [[-12, -3], [13, 4]]},
-    "sheet": {"strap_slot_mm": [3, 8]},
-    "limb": {"radius_mm": 61.7, "cast": "curved"},
-}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("data", [HEX, SLOTS], ids=["hex", "strap slots"])
-def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> None:
-    assert broken(patch_moulds(load_array(data))) == set()
-
-
-def test_every_tool_prints_without_support() -> None:
-    assert mesh_findings(sleeve()) == []
-
-
-def test_the_silicone_has_the_volume_of_its_lengths() -> None:
+def test_the_silicone_has_the_volume_of_its_lengths():
     """A barrel 1.25 thick and 60 long with corners of 10; what each unit adds under it, summed over its foot."""
     moulds = sleeve()
     layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
@@ -97,7 +60,7 @@ def test_the_silicone_has_the_volume_of_its_lengths() -> None:
     )
 
 
-def test_each_unit_stands_where_its_arc_is() -> None:
+def test_each_unit_stands_where_its_arc_is():
     """The middle of its foot touches the limb, at the angle that its place has on the sheet's middle."""
     moulds = sleeve()
     middle = R + (moulds.arranged.sheet.low + moulds.arranged.sheet.high) / 2
@@ -131,12 +94,12 @@ FAULTS: list[tuple[str, str, str, Change]] = [
 
 
 @pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
-def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Change) -> None:
+def test_a_planted_fault_is_caught(code, tool, what, change):
     faulty = mould_checks()[code].findings(with_tool(pair(), tool, change))
     assert not all(f.ok for f in faulty), what
 
 
-def test_a_wrong_axis_or_an_impossible_order_is_caught() -> None:
+def test_a_wrong_axis_or_an_impossible_order_is_caught():
     """Units pulled straight up, or along a neighbour's axis; the cast before the lid; Layer 1 never taken out."""
     plan = pair().plan
     first, last = plan.steps
@@ -158,7 +121,7 @@ def test_a_wrong_axis_or_an_impossible_order_is_caught() -> None:
         assert any(caught in f.where for f in found if not f.ok), caught
 
 
-def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
+def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap():
     plan = pair().plan
     first, last = plan.steps
     swapped = replace(last, earlier=(rotated(last.earlier[0], "y", 0.5), *last.earlier[1:]))
@@ -169,10 +132,10 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
 @pytest.fixture(scope="module")
 def procedure() -> Procedure:
     moulds = sleeve()
-    return curved_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0)
+    return array_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0, {})
 
 
-def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(procedure: Procedure) -> None:
+def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(procedure):
     first, last = ([step.title for step in pour.steps] for pour in procedure.pours)
     assert first[-1] == "Cup 1 off"
     order = ["Layer 1 out", "Filament into base 2", "Wipe Layer 1", "Lay Layer 1 in", "Lid 2 on", "Inject", "Cure"]
@@ -185,7 +148,7 @@ def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(procedure:
     assert "No release agent" in next(step.text for step in procedure.pours[0].steps if step.title == "Cup 1 on")
 
 
-def test_what_is_weighed_and_bought_is_that_of_both_pours(procedure: Procedure) -> None:
+def test_what_is_weighed_and_bought_is_that_of_both_pours(procedure):
     volumes = [sleeve().mesh(body).volume() for body in sleeve().unit]
     # A sprue of 3 mm and four vents of 1 mm through the lid's 3 mm, and 0.25 mm into the sheet: the vents, which stand
     # 2.5 degrees aside, that far below its back at their outer edges.
@@ -204,7 +167,7 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(procedure: Procedure) 
     assert "flat pliers" not in items  # for tongues that are cut
 
 
-def test_curved_tools_beyond_the_bed_are_refused_with_the_rows_that_fit() -> None:
+def test_curved_tools_beyond_the_bed_are_refused_with_the_rows_that_fit():
     """A row more does not fit."""
     refused = refusal_of("sleeve-curved", ["layout.rows=12"])
     assert refused.field == "layout.rows"

@@ -13,24 +13,15 @@ import pytest
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.sheet import slot_profile
-from unitcad.checks import check_moulds
 from unitcad.errors import UnitcadError
 
 
 @pytest.mark.parametrize("height", [2.0, 3 - 1 / 1024, 3.0, 3 + 1 / 1024, 4.0])
 @pytest.mark.parametrize("width", [3.0, 3 - 1 / 1024])
-def test_a_strap_slot_of_any_proportion_has_round_ends(width: float, height: float) -> None:
+def test_a_strap_slot_of_any_proportion_has_round_ends(width, height):
     drawn, r = slot_profile((5.0, -1.0, 5 + width, height - 1)), min(width, height) / 2
     assert drawn.area == pytest.approx(width * height - (4 - math.pi) * r**2, rel=1e-3)
     assert drawn.bounds == pytest.approx((5, -1, 5 + width, height - 1), abs=1e-3)
-
-
-@pytest.mark.parametrize("slot", [[3.0, 3.0], [3.0, 2.0]])
-@pytest.mark.parametrize("name", ["forearm-pockets", "forearm-patch"])
-def test_a_sheet_with_round_strap_slots_keeps_every_check(name: str, slot: list[float]) -> None:
-    changes = {"sheet.strap_slot_mm": slot, "layout.columns": 2, "layout.rows": 1}
-    findings = check_moulds(patch_moulds(load_array(name, changes)))
-    assert [f for f in findings if not f.ok] == []
 
 
 MADE: list[tuple[str, dict[str, Any]]] = [
@@ -41,7 +32,7 @@ MADE: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("name", "changes"), MADE)
-def test_what_is_rare_is_made(name: str, changes: dict[str, Any]) -> None:
+def test_what_is_rare_is_made(name, changes):
     assert patch_moulds(load_array(name, changes)).plan
 
 
@@ -77,7 +68,7 @@ def far_out(seed: int) -> tuple[str, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("seed", [*range(15), *(pytest.param(i, marks=pytest.mark.long) for i in range(15, 1000))])
-def test_values_far_out_are_planned_or_refused_within_seconds(seed: int) -> None:
+def test_values_far_out_are_planned_or_refused_within_seconds(seed):
     name, changes = far_out(seed)
     start = time.process_time()
     with contextlib.suppress(UnitcadError):

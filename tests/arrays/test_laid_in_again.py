@@ -26,14 +26,14 @@ def with_steps(*steps: Step) -> PatchMoulds:
     return patch_moulds(patch().arranged, replace(patch().plan, steps=steps))
 
 
-def test_a_layer_that_is_laid_in_askew_overlaps_what_stands_there() -> None:
+def test_a_layer_that_is_laid_in_askew_overlaps_what_stands_there():
     first, last = patch().plan.steps
     askew = replace(last, earlier=tuple(moved(shape, x=0.25) for shape in last.earlier))
     found = {finding.where for finding in overlap.findings(with_steps(first, askew)) if not finding.ok}
     assert found >= {"pour 2: base and layer1 laid in", "pour 2: layer1 laid in and layer2"}
 
 
-def test_a_layer_is_laid_in_elsewhere_only_once_it_was_taken_out() -> None:
+def test_a_layer_is_laid_in_elsewhere_only_once_it_was_taken_out():
     """Order by order, which of them can be done: the next pour is cast on Layer 1, or has it laid in anew."""
     first, last = patch().plan.steps
     elsewhere = replace(last, earlier=tuple(moved(shape, z=1.0) for shape in last.earlier))
@@ -80,14 +80,14 @@ LEFT, RIGHT = ((side * math.sin(math.radians(25)), 0.0, math.cos(math.radians(25
 LEFT_HALF = box(-99, 0, -99, 99, -99, 99)
 
 
-def test_each_part_of_the_silicone_leaves_along_its_own_way() -> None:
+def test_each_part_of_the_silicone_leaves_along_its_own_way():
     halves = LEFT_HALF, None
     assert parted((LEFT, RIGHT), halves) == []
     assert parted((RIGHT, LEFT), halves) == [f"pour 1: cast part {i} out against base" for i in range(2)]
     assert parted((UP,), (None,)) == ["pour 1: cast part 0 out against base"]
 
 
-def test_parts_that_are_not_there_or_are_left_behind_are_found() -> None:
+def test_parts_that_are_not_there_or_are_left_behind_are_found():
     assert parted((LEFT, LEFT), (LEFT_HALF, LEFT_HALF))[0] == "pour 1: cast part 1 out"
     (stays, *_) = parted((LEFT,), (LEFT_HALF,))
     # Half the plate, and a slanted peg from 4 mm under its middle up to the plate.

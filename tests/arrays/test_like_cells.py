@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.arrays.made_arrays import Change, findings, less, made, more, with_tool
+from tests.arrays.made_arrays import Change, findings, made, more, with_tool
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.checks.finding import MouldFinding
@@ -27,20 +27,20 @@ def shown(finding: MouldFinding) -> tuple:
 
 
 @pytest.mark.parametrize("name", ["wrist-band", pytest.param("sleeve-curved", marks=pytest.mark.long)])
-def test_an_array_has_the_findings_that_each_cell_has_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_array_has_the_findings_that_each_cell_has_alone(name, monkeypatch):
     moulds = made(name)
     assert len(set(moulds.cells[0])) < len(moulds.cells[0])
     assert [shown(f) for f in findings(name)] == findings_of_each_cell(moulds, monkeypatch)
 
 
-def test_the_rows_of_a_patch_are_alike() -> None:
+def test_the_rows_of_a_patch_are_alike():
     """A row's units differ in the ways of the circuit, left, right or both, and in nothing else."""
     cells = made("forearm-patch").cells
     assert cells[0] == cells[1]
     assert [cells[0].index(number) for number in cells[0]] == [0, 1, 2] * 3
 
 
-def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_their_own() -> None:
+def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_their_own():
     flat, curved = made("sleeve-curved").surroundings
     assert [len(each.steps) for each in (flat, curved)] == [1, 1]
     one, other = made("forearm-patch").surroundings
@@ -52,17 +52,14 @@ ROWS = "forearm-patch", "layout.rows=2", "sheet.strap_slot_mm=[3,8]"
 FAULTS: dict[str, tuple[str, str, Change]] = {
     "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, -4.5, -4, 1, 2))),
     "a core of the middle 0.2 too high": ("C200", "base", more(moved(cylinder(3, 0, 2.31), 0, -10))),
-    "a leak between two cells": ("C100", "cup1", less(box(4, 16, 12.5, 13.1, 1, 2))),
-    "a hole under a cell": ("C100", "base", less(moved(cylinder(0.2, -9, 1), 25, 10))),
     "a knob on a core": ("C300", "base", more(moved(cylinder(4.7, 1.0, 1.4), 20, 10))),
-    "a lip in the last cup's bore": ("C200", "cup2", more(box(-7.2, -6.9, 9, 11, 2.5, 2.8))),
 }
 
 
 @pytest.mark.parametrize(
     "fault", [pytest.param(f, marks=[] if f.startswith("a lump") else [pytest.mark.long]) for f in FAULTS]
 )
-def test_a_fault_at_one_cell_is_found_as_if_each_were_judged(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_at_one_cell_is_found_as_if_each_were_judged(fault, monkeypatch):
     code, tool, change = FAULTS[fault]
     moulds = with_tool(made(*ROWS), tool, change)
     found = [shown(finding) for finding in check_moulds(moulds)]

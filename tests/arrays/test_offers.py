@@ -52,7 +52,7 @@ OFFERED: list[tuple[str, dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("name", "changes", "field"), OFFERED)
-def test_what_can_not_be_cast_is_refused_with_what_would(name: str, changes: dict[str, Any], field: str) -> None:
+def test_what_can_not_be_cast_is_refused_with_what_would(name, changes, field):
     refused = refusal_of(name, changes)
     assert refused.field == field
     assert patch_moulds(load_array(name, {**changes, field: refused.nearest})).plan
@@ -84,7 +84,7 @@ REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
 
 
 @pytest.mark.parametrize(("name", "changes", "field", "nearest"), REFUSED)
-def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], field: str, nearest: object) -> None:
+def test_what_can_not_be_made_is_refused(name, changes, field, nearest):
     refused = refusal_of(name, changes)
     assert (refused.field, refused.nearest) == (field, nearest)
 
@@ -105,9 +105,7 @@ def named(limit: str, before: str, after: str) -> dict[str, Any]:
         (_SMALL_BED, {}, "moulds.bed_x_mm", set()),
     ],
 )
-def test_the_value_offered_is_accepted_with_what_it_also_needs(
-    data: dict[str, Any], changes: dict[str, Any], field: str, also: set[str]
-) -> None:
+def test_the_value_offered_is_accepted_with_what_it_also_needs(data, changes, field, also):
     source = {"name": "offered", **data}
     refused = refusal_of(source, changes)
     assert refused.field == field
@@ -125,9 +123,7 @@ def test_the_value_offered_is_accepted_with_what_it_also_needs(
         ("sleeve-curved", {"moulds.bed_x_mm": 60}, {"layout.columns": 2}),
     ],
 )
-def test_a_bed_or_circuit_too_small_names_the_layout_that_fits(
-    source: Any, changes: dict[str, Any], words: dict[str, Any]
-) -> None:
+def test_a_bed_or_circuit_too_small_names_the_layout_that_fits(source, changes, words):
     refused = refusal_of(source, changes)
     found = named(refused.limit, "(?:on this bed|with this circuit)", "would do")
     assert found == words
@@ -135,7 +131,7 @@ def test_a_bed_or_circuit_too_small_names_the_layout_that_fits(
         assert patch_moulds(load_array(source, {**changes, path: value})).plan
 
 
-def test_a_plate_that_fits_turned_by_a_quarter_says_so() -> None:
+def test_a_plate_that_fits_turned_by_a_quarter_says_so():
     array = load_array("hex-19", _RESIN)
     with pytest.raises(Refusal, match=r"turned by a quarter it fits: moulds\.bed_x_mm = 80, bed_y_mm = 130") as refused:
         MouldSet(array.unit).plan  # noqa: B018
@@ -143,14 +139,14 @@ def test_a_plate_that_fits_turned_by_a_quarter_says_so() -> None:
     assert MouldSet(load_array(array, {"moulds.bed_x_mm": 80, "moulds.bed_y_mm": 130}).unit).plan
 
 
-def test_another_unit_in_a_back_sheet_is_named() -> None:
+def test_another_unit_in_a_back_sheet_is_named():
     refused = refusal_of("forearm-patch", {"place": [{"at": "B2", "unit": "motor-10mm"}]})
     assert (refused.field, refused.value, refused.nearest) == ("place.0.unit", "motor-10mm", None)
     assert "leave it out" in refused.limit
 
 
 @pytest.mark.parametrize(("name", "tail"), [("hex-19", 2.7), ("forearm-pockets", 6.6)])
-def test_the_pitch_offered_is_the_nearest_that_needs_nothing_else(name: str, tail: float) -> None:
+def test_the_pitch_offered_is_the_nearest_that_needs_nothing_else(name, tail):
     refused = refusal_of(name, {"layout.pitch_mm": 12})
     assert refused.nearest == 18
     assert f"layout.pitch_mm = 16 would also need unit.fpcb.tail_length_mm = {tail}" in refused.limit
@@ -159,7 +155,7 @@ def test_the_pitch_offered_is_the_nearest_that_needs_nothing_else(name: str, tai
     assert refusal_of(name, {"layout.pitch_mm": 17.9}).field == "unit.fpcb.tail_length_mm"
 
 
-def test_where_no_pitch_does_alone_the_combination_is_offered() -> None:
+def test_where_no_pitch_does_alone_the_combination_is_offered():
     changes = {"layout.pitch_mm": 12, "unit.fpcb.tail_length_mm": 60}
     first = refusal_of("forearm-pockets", changes)
     offers = {one.field: one.nearest for one in (first, *first.others)}
@@ -171,7 +167,7 @@ def test_where_no_pitch_does_alone_the_combination_is_offered() -> None:
 
 @pytest.mark.parametrize("pitch", [0, -3])
 @pytest.mark.parametrize("name", ["forearm-pockets", "hex-19"])
-def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name: str, pitch: float) -> None:
+def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name, pitch):
     refused = refusal_of(name, {"layout.pitch_mm": pitch})
     assert (refused.field, refused.limit.partition(";")[0], refused.file) == (
         "layout.pitch_mm",
@@ -181,7 +177,7 @@ def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name: str, 
 
 
 @pytest.mark.parametrize(("unit", "tail", "pitch"), [("three-layer", 5.6, 21), ("pass-through", 7.1, 21.7)])
-def test_a_tail_too_long_is_told_the_length_and_the_pitch(unit: str, tail: float, pitch: float) -> None:
+def test_a_tail_too_long_is_told_the_length_and_the_pitch(unit, tail, pitch):
     refused = refusal_of("hex-19", {"unit": unit})
     assert (refused.field, refused.nearest) == ("unit.fpcb.tail_length_mm", tail)
     assert f"with layout.pitch_mm = {pitch} it is accepted as it is" in refused.limit
@@ -189,7 +185,7 @@ def test_a_tail_too_long_is_told_the_length_and_the_pitch(unit: str, tail: float
     assert load_array("hex-19", {"unit": unit, "unit.fpcb.tail_length_mm": tail})
 
 
-def test_an_angle_at_which_a_tail_runs_into_a_unit_is_told_the_nearest_free_one() -> None:
+def test_an_angle_at_which_a_tail_runs_into_a_unit_is_told_the_nearest_free_one():
     points = {"kind": "list", "points_mm": [[0, 0], [20, 0]]}
     data = {"name": "pair", "array": "pockets", "unit": "encapsulating", "layout": points}
     changes = {"place": [{"at": "P2", "angle_deg": 180}]}
@@ -202,7 +198,7 @@ def test_an_angle_at_which_a_tail_runs_into_a_unit_is_told_the_nearest_free_one(
             load_array(data, {"place": [{"at": "P2", "angle_deg": angle}]})
 
 
-def test_the_name_that_was_meant_is_offered_before_another_one() -> None:
+def test_the_name_that_was_meant_is_offered_before_another_one():
     limit, nearest = "unknown name; closest: pockets; then its units are held with their own circuits", "pockets"
     with pytest.raises(Refusal) as refused:
         load_array("forearm-patch", {"array": "pocket"})

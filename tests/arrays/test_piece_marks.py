@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from tests.arrays.made_arrays import made
-from unitcad.arrays.array_file import array_templates
 from unitcad.arrays.piece_seams import Strip, on_pieces
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.cuts import straight
@@ -14,21 +13,14 @@ from unitcad.shape import box, union
 from unitcad.shape.lettering import engraving, seen
 
 
-@pytest.mark.parametrize("name", array_templates())
-def test_no_label_of_an_array_holds_a_mark(name: str) -> None:
-    label = made(name).plan.label
-    assert len(label) == 4
-    assert not set(label) & set("BCDL")
-
-
-def test_a_label_has_no_letter_of_a_mark_and_is_shown_as_it_is_engraved() -> None:
+def test_a_label_has_no_letter_of_a_mark_and_is_shown_as_it_is_engraved():
     labels = {set_label([box(0, i + 1, 0, 1, 0, 1)]) for i in range(300)}
     assert len(labels) > 290
     assert set().union(*labels) == set("0123456789AEF")
     assert all(seen(label) == label for label in labels)
 
 
-def test_every_piece_of_a_split_tool_carries_mark_label_and_number() -> None:
+def test_every_piece_of_a_split_tool_carries_mark_label_and_number():
     """The strokes that are cut away at each piece's rim are those of its own row of texts."""
     moulds = made("wrist-band")
     plan, lengths = moulds.plan, moulds.spec.moulds
@@ -46,7 +38,7 @@ def _area(text: str, stroke: float) -> float:
     return realise(engraving(text, stroke, 0.0, 1.0), 24).volume()
 
 
-def test_a_row_of_texts_stands_whole_where_it_has_room() -> None:
+def test_a_row_of_texts_stands_whole_where_it_has_room():
     """A bar cut in pieces of 45, 25 and 30 mm: the row of 28 mm has room on the first alone, beside what is taken."""
     stroke = 0.8
     strip = Strip((0.0, 0.0, 100.0, 20.0), 1.0, stroke, (0.0, 1.0), "top", taken=[(0.0, 15.0, 4.0, 20.0)])

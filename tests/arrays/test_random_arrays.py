@@ -73,13 +73,13 @@ def drawn(seed: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("seed", [*range(QUICK), *(pytest.param(i, marks=pytest.mark.long) for i in range(QUICK, ALL))])
-def test_a_random_array_is_made_with_all_checks_or_refused(seed: int) -> None:
+def test_a_random_array_is_made_with_all_checks_or_refused(seed):
     judge(drawn(seed))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(ALL))
-def test_a_random_array_on_a_small_bed_is_made_in_pieces_or_refused(seed: int) -> None:
+def test_a_random_array_on_a_small_bed_is_made_in_pieces_or_refused(seed):
     data = drawn(seed)
     put(data, "moulds.bed_x_mm", 110.0)
     put(data, "moulds.bed_y_mm", 110.0)

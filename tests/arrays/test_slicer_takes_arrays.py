@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
@@ -25,7 +23,7 @@ NAMES = [pytest.param(name, marks=pytest.mark.long if name in SLOW else ()) for 
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_tool_of_an_array_is_sliced(name: str, tmp_path: Path) -> None:
+def test_every_tool_of_an_array_is_sliced(name, tmp_path):
     moulds = patch_moulds(load_array(name))
     taken = 0.0
     for tool in moulds.plan.pieces:

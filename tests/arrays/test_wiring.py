@@ -1,14 +1,13 @@
 """The common circuit's rows, spine and tail: where they lie, what they may not run into, what is offered instead."""
 
 import math
-import random
 
 import numpy as np
 import pytest
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit import LEAST_BEND, _arc_sides, wiring
+from unitcad.arrays.circuit import LEAST_BEND, wiring
 from unitcad.errors import Refusal
 
 NINE = {
@@ -29,7 +28,7 @@ def over(array: Array, *sets: str) -> Array:
     return load_array(array, sets)
 
 
-def test_nine_units_have_three_rows_and_a_spine_between_two_columns() -> None:
+def test_nine_units_have_three_rows_and_a_spine_between_two_columns():
     found = wiring(nine())
     assert [pad.name for pad in found.pads] == [f"{row}{column}" for row in "ABC" for column in (1, 2, 3)]
     assert [(row.start, row.end) for row in found.rows] == [((-20, y), (20, y)) for y in (20, 0, -20)]
@@ -38,21 +37,21 @@ def test_nine_units_have_three_rows_and_a_spine_between_two_columns() -> None:
     assert found.thickness == pytest.approx(0.11)
 
 
-def test_a_spine_is_laid_where_it_is_asked_for() -> None:
+def test_a_spine_is_laid_where_it_is_asked_for():
     assert wiring(nine(circuit={"spine_mm": -10.0})).end[0] == -10
     turned = wiring(nine(circuit={"rows": "y", "spine_mm": 10.0, "tail_mm": 3.0}))
     assert turned.end == (nine().sheet.outline[0] - 3, 10)
     assert turned.rows[0].start[0] == turned.rows[0].end[0]
 
 
-def test_a_hexagon_has_a_spine_that_steps_from_gap_to_gap() -> None:
+def test_a_hexagon_has_a_spine_that_steps_from_gap_to_gap():
     hexagon = nine(layout={"kind": "hex", "rings": 2, "pitch_mm": 22.0})
     found = wiring(hexagon)
     assert len(found.spine) == 6
     assert len(found.rows) == 5
 
 
-def test_one_column_needs_no_rows() -> None:
+def test_one_column_needs_no_rows():
     found = wiring(nine(layout={"kind": "grid", "columns": 1, "rows": 4, "pitch_mm": 18.0}))
     assert found.rows == ()
     assert found.end[0] == 0
@@ -69,7 +68,7 @@ def test_one_column_needs_no_rows() -> None:
         ({"unit": "no-fpcb"}, "unit.fpcb", None),
     ],
 )
-def test_what_does_not_fit_is_refused_with_what_would(tables: dict, field: str, nearest: object) -> None:
+def test_what_does_not_fit_is_refused_with_what_would(tables, field, nearest):
     with pytest.raises(Refusal) as refused:
         wiring(nine(**tables))
     assert (refused.value.field, refused.value.nearest) == (field, nearest)
@@ -77,13 +76,13 @@ def test_what_does_not_fit_is_refused_with_what_would(tables: dict, field: str, 
         wiring(over(nine(**tables), f"{field}={nearest!r}".replace("'", '"')))
 
 
-def test_units_in_pockets_keep_circuits_of_their_own() -> None:
+def test_units_in_pockets_keep_circuits_of_their_own():
     with pytest.raises(Refusal, match="own circuit") as refused:
         nine(array="pockets", circuit={})
     assert (refused.value.field, refused.value.nearest) == ("array", "back-sheet")
 
 
-def test_a_narrow_limb_bends_the_circuit_between_two_pads_too_much() -> None:
+def test_a_narrow_limb_bends_the_circuit_between_two_pads_too_much():
     thick = {"like": "encapsulating", "fpcb": {"tail_length_mm": 2.0, "thickness_mm": 0.6}}
     close = {"kind": "grid", "columns": 3, "rows": 3, "pitch_mm": [18.0, 18.0]}
     array = nine(unit=thick, layout=close, limb={"radius_mm": 10.0})
@@ -95,7 +94,7 @@ def test_a_narrow_limb_bends_the_circuit_between_two_pads_too_much() -> None:
     wiring(over(array, f"limb.radius_mm={refused.value.nearest}"))
 
 
-def test_every_way_that_is_found_is_clear_by_points() -> None:
+def test_every_way_that_is_found_is_clear_by_points():
     """Random grids and hexagons: points of each strip against each unit and slot, or a refusal whose value fits."""
     rng, found = np.random.default_rng(2), 0
     for _ in range(60):
@@ -129,35 +128,3 @@ def test_every_way_that_is_found_is_clear_by_points() -> None:
                 single = len({place.x for place in array.places}) == 1 or len({p.y for p in array.places}) == 1
                 assert single or not own
     assert found > 20
-
-
-def sides_one_by_one(points: np.ndarray) -> int:
-    """The sides that go on an arc, one more at a time, each time on the circle through first, middle and last point."""
-    for count in range(3, len(points) + 1):
-        some = points[:count]
-        three = some[[0, count // 2, -1]]
-        try:
-            middle = np.linalg.solve(2 * (three[1:] - three[0]), (three[1:] ** 2).sum(axis=1) - (three[0] ** 2).sum())
-        except np.linalg.LinAlgError:
-            return count - 2
-        away = np.hypot(*(some - middle).T)
-        a, b = three[0] - three[1], three[2] - three[1]
-        turn = 360 - 2 * math.degrees(math.acos(float(a @ b) / float(np.hypot(*a) * np.hypot(*b))))
-        if turn > 170 or np.abs(away - away[0]).max() >= 2e-3:
-            return count - 2
-    return len(points) - 1
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_arcs_end_where_their_points_leave_one_circle(seed: int) -> None:
-    """An arc runs on as a line, as the same arc the other way round, or farther than half a turn."""
-    pick = random.Random(seed)
-    radius, step, sides = pick.uniform(0.5, 8), math.radians(pick.uniform(1, 4)), pick.randint(4, 40)
-    angles = step * np.arange(sides + 1)
-    arc = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    along = np.array([-math.sin(angles[-1]), math.cos(angles[-1])]) * 2 * radius * step
-    for after in (arc[-1] + np.arange(1, 60)[:, None] * along, arc[-2::-1] + np.array((3 * radius, 0)), arc[:0]):
-        points = np.concatenate([arc, after])
-        assert sides - 1 <= _arc_sides(points) == sides_one_by_one(points)
-    whole = np.linspace(0, 2 * math.pi, 180)
-    assert _arc_sides(np.stack([np.cos(whole), np.sin(whole)], axis=1)) == int(170 // (360 / 179))

@@ -7,12 +7,11 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from benchmarks.accuracy import layered_mp, thomson_haskell
+from benchmarks.accuracy import layered_mp
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor
-from unitcad.errors import Refusal
 
-COMPLIANCE = Path(thomson_haskell.__file__).parent / "references" / "compliance.json"
+COMPLIANCE = Path(layered_mp.__file__).parent / "references" / "compliance.json"
 CASES = json.loads(COMPLIANCE.read_text("utf-8"))
 LIMIT = 1e-13
 
@@ -22,17 +21,17 @@ def damping_of(tan_delta, viscosity):
     return KelvinVoigt(viscosity) if viscosity else LossFactor(tan_delta) if tan_delta else None
 
 
-def medium_of(bodies) -> LayeredMedium:
+def medium_of(bodies):
     layers = [Layer(h, rho, e, nu, damping_of(*loss)) for h, rho, e, nu, *loss in bodies[:-1]]
     _, rho, e, nu, *loss = bodies[-1]
     return LayeredMedium(layers, HalfSpace(rho, e, nu, damping_of(*loss)))
 
 
-def relative_error(found, reference) -> float:
+def relative_error(found, reference):
     return float(np.linalg.norm(found - reference) / np.linalg.norm(reference))
 
 
-def case_error(case) -> float:
+def case_error(case):
     found = medium_of(case["bodies"]).compliance(case["k"], case["omega"])
     reference = np.array([complex(*pair) for pair in case["compliance"]]).reshape(2, 2)
     return relative_error(found, reference) / case["condition"]
@@ -45,7 +44,7 @@ def test_sixty_digits_everywhere():
     assert errors[worst] <= LIMIT, CASES[worst]
 
 
-def _live(bodies, k, omega) -> tuple[np.ndarray, float]:
+def _live(bodies, k, omega):
     with mp.workdps(60):
         bodies = [layered_mp.Body(*body) for body in bodies]
         found = layered_mp.compliance(bodies, k, omega)
@@ -66,20 +65,7 @@ def test_on_the_branch_points_of_a_thick_layer(nu, off):
         assert relative_error(medium_of([[*b, 0, 0] for b in bodies]).compliance(k, omega), reference) <= LIMIT * cond
 
 
-def test_thomson_haskell_fails_where_the_solver_holds():
-    def plain_error(case):
-        found = thomson_haskell.compliance(medium_of(case["bodies"]), case["k"], case["omega"])
-        reference = np.array([complex(*pair) for pair in case["compliance"]]).reshape(2, 2)
-        return np.nan_to_num(relative_error(found, reference), nan=np.inf)
-
-    errors = np.array([plain_error(case) for case in CASES if case["kind"] == "wide"])
-    assert np.mean(errors > 1e-2) > 0.5
-    medium = LayeredMedium([Layer(1e-3, 1000, 1e5, 0.45)], HalfSpace(1000, 3e4, 0.45))
-    exact = medium.compliance(100.0, 785.0)
-    assert relative_error(thomson_haskell.compliance(medium, 100.0, 785.0), exact) < 1e-11
-
-
-@pytest.mark.parametrize("omega", [6e3, 785.0, 6e-8, 0.0])
+@pytest.mark.parametrize("omega", [785.0, 0.0])
 def test_ten_thousand_sublayers_change_nothing(omega):
     count, h, k = 10_000, 0.02, np.array([0.3, 80.0, 9e3])
     body = (1040.0, 15e3, 0.4999, LossFactor(0.2))
@@ -87,16 +73,6 @@ def test_ten_thousand_sublayers_change_nothing(omega):
     whole = LayeredMedium([Layer(h, *body)], base).compliance(k, omega)
     cut = LayeredMedium([Layer(h / count, *body)] * count, base).compliance(k, omega)
     assert max(relative_error(one, other) for one, other in zip(cut, whole, strict=True)) < LIMIT
-
-
-def test_static_half_space_is_boussinesqs():
-    """C = [[1 - nu, -(1 - 2 nu) / 2], [.., 1 - nu]] / (mu k)."""
-    for nu in (-0.9, 0.0, 0.3, 0.5):
-        mu, k = 3e4 / (2 * (1 + nu)), np.array([1e-3, 7.0, 1e9])
-        off = -(1 - 2 * nu) / 2
-        exact = np.array([[1 - nu, off], [off, 1 - nu]]) / (mu * k[:, None, None])
-        found = LayeredMedium([], HalfSpace(1000, 3e4, nu)).compliance(k, 0.0)
-        assert np.max(np.abs(found / (1 / (mu * k[:, None, None])) - exact * mu * k[:, None, None])) < 1e-15
 
 
 def test_compliance_is_symmetric_and_passive():
@@ -118,49 +94,8 @@ def test_shapes_and_complex_wavenumbers():
     assert np.array_equal(medium.compliance(k, 785.0)[1, 2], medium.compliance(k[1, 2], 785.0))
 
 
-def test_zero_thickness_and_free_underside():
-    base = HalfSpace(1000, 3e4, 0.45)
-    bare = LayeredMedium([], base).compliance(50.0, 100.0)
-    assert np.array_equal(LayeredMedium([Layer(0.0, 2000, 1e9, 0.2)], base).compliance(50.0, 100.0), bare)
+def test_free_underside():
     plate = LayeredMedium([Layer(1e-3, 1000, 1e6, 0.3)], HalfSpace(0.0, 0.0, 0.3))
     k, omega, h = 20.0, 30.0, 1e-3
     bending = 1e6 * h**3 / (12 * (1 - 0.3**2)) * k**4 - 1000 * h * omega**2  # Kirchhoff's thin plate
     assert plate.compliance(k, omega)[1, 1].real == pytest.approx(1 / bending, rel=3e-3)
-
-
-@pytest.mark.parametrize(
-    ("make", "field"),
-    [
-        (lambda: Layer(1e-3, 1000, 1e5, 0.5 + 1e-9), "layer.poisson_ratio"),
-        (lambda: Layer(1e-3, 1000, 1e5, -1.01), "layer.poisson_ratio"),
-        (lambda: Layer(1e-3, 1000, 1e5, -1.0), "layer.poisson_ratio"),
-        (lambda: Layer(-1e-3, 1000, 1e5, 0.3), "layer.thickness"),
-        (lambda: Layer(1e-3, -1, 1e5, 0.3), "layer.density"),
-        (lambda: Layer(1e-3, 1000, 0.0, 0.3), "layer.youngs_modulus"),
-        (lambda: Layer(float("nan"), 1000, 1e5, 0.3), "layer.thickness"),
-        (lambda: HalfSpace(1000, float("nan"), 0.3), "half_space.youngs_modulus"),
-        (lambda: HalfSpace(float("inf"), 1e5, 0.3), "half_space.density"),
-        (lambda: KelvinVoigt(-1.0), "damping.viscosity"),
-        (lambda: LossFactor(float("nan")), "damping.tan_delta"),
-        (lambda: FractionalKelvinVoigt(1e-3, 1.5), "damping.n"),
-    ],
-)
-def test_bodies_that_cannot_be_are_refused(make, field):
-    with pytest.raises(Refusal) as refused:
-        make()
-    assert refused.value.field == field
-
-
-def test_questions_that_have_no_answer_are_refused():
-    medium = LayeredMedium([Layer(1e-3, 1000, 1e5, 0.3)], HalfSpace(1000, 1e5, 0.3))
-    free = LayeredMedium([Layer(1e-3, 1000, 1e5, 0.3)], HalfSpace(0.0, 0.0, 0.3))
-    for body, k, omega, field in [
-        (free, 10.0, 0.0, "omega"),
-        (medium, 10.0, -1.0, "omega"),
-        (medium, 10.0, float("nan"), "omega"),
-        (medium, 0.0, 1.0, "k"),
-        (medium, [1.0, float("nan")], 1.0, "k"),
-    ]:
-        with pytest.raises(Refusal) as refused:
-            body.compliance(k, omega)
-        assert refused.value.field == field

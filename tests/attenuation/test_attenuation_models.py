@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.edge.measured import CLASSES, measured_slopes, measured_table, whole_ratio
+from unitcad.attenuation.edge.measured import CLASSES, measured_table, whole_ratio
 from unitcad.attenuation.edge.models import (
     COMPARED,
     MODELS,
@@ -117,20 +117,6 @@ def test_inequalities_6_do_not_suffice_for_5():
     assert min(margins.values()) > 0
 
 
-def test_constraint_a_is_zero_above_zero_at_one_half():
-    unit = units(E10, D30, nu=0.5)
-    constraint = next(c for c in cf.constraints(unit, unit.control(1)) if c.name == "6a")
-    assert constraint.left == constraint.right == 0
-    assert not constraint.margin > 0
-
-
-def test_n_layers():
-    unit = units(E10, D10, D30)
-    assert cf.transmissions(unit).shape == (3,)
-    assert len(cf.constraints(unit, unit.control(0))) == 4 + 2 * 2
-    assert np.isfinite(cf.published_path(unit))
-
-
 @pytest.mark.parametrize("model", MODELS)
 def test_arrays_give_what_single_calls_give(model):
     rng = np.random.default_rng(1)
@@ -144,16 +130,7 @@ def test_arrays_give_what_single_calls_give(model):
         assert levels[i] == pytest.approx(float(edge_levels(one, model)), rel=1e-14)
 
 
-def test_the_table_is_the_catalogues():
-    table = measured_table()
-    assert len(table.names) == 9
-    assert len(table.pairs) == 12
-    data = measurements()
-    tables = (data.controls, *(measured.levels for measured in data.designs.values()))
-    assert set(table.levels) == {level for one in tables for level in one.values()}
-
-
-def test_the_measured_designs_are_shipped_and_alone_have_passes() -> None:
+def test_the_measured_designs_are_shipped_and_alone_have_passes():
     assert {name: (design.passes, design.caps) for name, design in shipped().items() if design.passes} == {
         name: (measured.passes, measured.caps) for name, measured in measurements().designs.items()
     }
@@ -251,12 +228,6 @@ def test_a_class_left_out_costs_more():
             assert errors[name] == pytest.approx(np.exp(off.mean()), rel=1e-6)
     assert found["soft inside, two passes"]["rule"] == pytest.approx(1.76, abs=0.01)
     assert found["soft inside, two passes"]["baseline"] > 5
-
-
-def test_slopes_between_measured_units():
-    found = measured_slopes()
-    assert found["soft", 1] == pytest.approx([1.61, 0.73], abs=0.005)
-    assert [len(found[key]) for key in sorted(found)] == [3, 2]
 
 
 def test_what_leads_is_the_rule_unless_a_model_is_told_apart_from_it_and_the_baseline():

@@ -10,14 +10,13 @@ from scipy import optimize
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc
-from unitcad.errors import Refusal
 
 REFERENCES = Path(__file__).parent / "references"
 A, OMEGA = 3.5e-3, 2 * np.pi * 125
 RADII = np.geomspace(1e-4, 50e-3, 13)
 
 
-def forearm(damped: bool = True) -> LayeredMedium:
+def forearm(damped=True):
     def of(law):
         return law if damped else None
 
@@ -31,11 +30,11 @@ def forearm(damped: bool = True) -> LayeredMedium:
     )
 
 
-def largest(response) -> float:
+def largest(response):
     return float(max(np.max(np.abs(response.u_z)), np.max(np.abs(response.u_r))))
 
 
-def difference(one, other) -> float:
+def difference(one, other):
     return float(max(np.max(np.abs(one.u_z - other.u_z)), np.max(np.abs(one.u_r - other.u_r))))
 
 
@@ -120,7 +119,7 @@ def test_far_field_without_damping():
     assert max(case["r_over_a"] for case in data["cases"]) == 150
 
 
-def _closing(radius: float, step: int) -> tuple[float, float]:
+def _closing(radius, step):
     return radius * (1 - 4.0**-step), radius * (1 + 4.0**-step)
 
 
@@ -200,18 +199,7 @@ def test_tolerance_is_reached_on_the_forearm():
         assert difference(found, truth) <= found.error <= 1e-6 * largest(found)
 
 
-def test_shapes_and_refusals():
+def test_shapes():
     medium, load = forearm(), UniformDisc(A)
     assert np.ndim(medium.response(load, OMEGA, 5e-3).u_z) == 0
     assert medium.response(load, OMEGA, [[1e-3, 2e-3]]).u_r.shape == (1, 2)
-    for arguments, field in [
-        ((load, OMEGA, [float("nan")]), "r"),
-        ((load, OMEGA, [1e-3], -1e-3), "z"),
-        ((load, OMEGA, [1e-3], 0.0, 1e-15), "rtol"),
-        ((load, -1.0, [1e-3]), "omega"),
-    ]:
-        with pytest.raises(Refusal) as refused:
-            medium.response(*arguments)
-        assert refused.value.field == field
-    with pytest.raises(Refusal):
-        UniformDisc(0.0)

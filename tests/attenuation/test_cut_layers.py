@@ -1,9 +1,6 @@
 """One body has one level: a cut into layers changes nothing, and a layer that is hardly another one changes little."""
 
-from __future__ import annotations
-
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +18,7 @@ MATERIALS = ("ecoflex-00-10", "ecoflex-00-30", "dragon-skin-10-medium", "dragon-
 SPECS = 100
 
 
-def drawn(rng: Random, layers: int) -> dict[str, Any]:
+def drawn(rng, layers):
     """Return a spec's data without a circuit, so that any first cap will do."""
     design = rng.choice(["encapsulating", "embedded"])
     walls = [rng.uniform(1.1, 2.5) for _ in range(layers)]
@@ -42,7 +39,7 @@ def drawn(rng: Random, layers: int) -> dict[str, Any]:
     }
 
 
-def cut(layer: dict[str, Any], rng: Random) -> list[dict[str, Any]]:
+def cut(layer, rng):
     """Return a layer in two pieces. A wall and a cap of less than 0.5 mm are refused."""
     wall = rng.uniform(0.5, layer["wall_mm"] - 0.5)
     pieces = [{**layer, "wall_mm": wall}, {**layer, "wall_mm": layer["wall_mm"] - wall}]
@@ -52,7 +49,7 @@ def cut(layer: dict[str, Any], rng: Random) -> list[dict[str, Any]]:
     return pieces
 
 
-def levels(data: dict[str, Any]) -> np.ndarray:
+def levels(data):
     """Return every number on a unit's level before it is rounded: models and answer; NaN where there is none."""
     variant = estimate_input(from_data(data))
     found = [float(end[0]) for end in predictive_of([variant]).range]
@@ -63,14 +60,14 @@ def levels(data: dict[str, Any]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(SPECS))
-def test_a_cut_changes_no_level(seed: int) -> None:
+def test_a_cut_changes_no_level(seed):
     rng = Random(seed)
     whole = drawn(rng, rng.randint(1, 3))
     pieces = [piece for layer in whole["layers"] for piece in cut(layer, rng)]
     assert levels({**whole, "layers": pieces}) == pytest.approx(levels(whole), rel=1e-9, nan_ok=True)
 
 
-def nearly(whole: dict[str, Any], rng: Random) -> dict[str, Any]:
+def nearly(whole, rng):
     """Return the same body with one half of a cut layer 1e-6 stiffer."""
     at = rng.randrange(len(whole["layers"]))
     pieces = cut(whole["layers"][at], rng)
@@ -85,7 +82,7 @@ def nearly(whole: dict[str, Any], rng: Random) -> dict[str, Any]:
 KPA = {"ecoflex-00-10": 15.0, "dragon-skin-10-medium": 250.0, "dragon-skin-30": 355.0}
 
 
-def known(rng: Random, layers: int) -> dict[str, Any]:
+def known(rng, layers):
     """Return a spec whose silicones have a modulus."""
     data = drawn(rng, layers)
     for layer in data["layers"]:
@@ -94,7 +91,7 @@ def known(rng: Random, layers: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("seed", range(SPECS))
-def test_a_layer_that_is_hardly_another_one_changes_the_level_little(seed: int) -> None:
+def test_a_layer_that_is_hardly_another_one_changes_the_level_little(seed):
     rng = Random(seed)
     whole = known(rng, rng.randint(1, 3))
     expected, found = levels(whole), levels(nearly(whole, rng))
@@ -104,19 +101,19 @@ def test_a_layer_that_is_hardly_another_one_changes_the_level_little(seed: int) 
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_finite_elements_have_both_halves_of_the_law(seed: int) -> None:
+def test_finite_elements_have_both_halves_of_the_law(seed):
     pytest.importorskip("skfem")
     rng = Random(seed)
     whole = known(rng, 1 + seed % 3)
     other = [nearly(whole, rng), {**whole, "layers": [piece for layer in whole["layers"] for piece in cut(layer, rng)]}]
 
-    def solved(data: dict[str, Any]) -> float:
+    def solved(data):
         return finite_elements(merge_layers(estimate_input(from_data(data)), ALIKE), 125.0, "axial", "skin", None, 0.5)
 
     assert [solved(one) for one in other] == pytest.approx([solved(whole)] * 2, rel=1e-4)
 
 
-def test_three_layers_are_marked_and_have_a_wider_range() -> None:
+def test_three_layers_are_marked_and_have_a_wider_range():
     names = ["ecoflex-00-10", "dragon-skin-30", "ecoflex-00-10"]
     data = known(Random(5), 3)
     for layer, name in zip(data["layers"], names, strict=True):
@@ -127,7 +124,7 @@ def test_three_layers_are_marked_and_have_a_wider_range() -> None:
     assert three["p90"] / three["p10"] > 1.5 * two["p90"] / two["p10"]
 
 
-def test_two_pieces_of_one_silicone_are_named_by_the_first() -> None:
+def test_two_pieces_of_one_silicone_are_named_by_the_first():
     soft, hard = "ecoflex-00-10", "dragon-skin-30"
     layers = [{"material": name, "wall_mm": 0.7, "cap_mm": 1.0} for name in (soft, soft, hard, hard)]
     spec = from_data({**drawn(Random(1), 1), "design": "encapsulating", "layers": layers, "diameter_mm": 17.0})

@@ -12,9 +12,9 @@ from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 
-def test_slopes_of_both_readings_are_those_of_specs_that_were_changed() -> None:
+def test_slopes_of_both_readings_are_those_of_specs_that_were_changed():
     variant = estimate_input(load("embedded"))
-    lines: list[str] = []
+    lines = []
     found = {one["reading"]: one for one in fem_sensitivities(variant, lines.append)}
     assert set(found) == {"skin", "edge"}
     assert len(set(lines)) == len(changed(variant))
@@ -26,12 +26,12 @@ def test_slopes_of_both_readings_are_those_of_specs_that_were_changed() -> None:
             assert one["by"].get(path, 0.0) == pytest.approx(math.log(high / low) / (2 * STEP), abs=0.02), path
 
 
-def test_a_unit_without_a_modulus_has_no_slopes() -> None:
+def test_a_unit_without_a_modulus_has_no_slopes():
     assert fem_sensitivities(estimate_input(load("embedded", ["layers.0.material=ecoflex-00-50"]))) == []
 
 
-def test_no_poisson_s_ratio_above_one_half_is_asked_for() -> None:
-    seen: list[float] = []
+def test_no_poisson_s_ratio_above_one_half_is_asked_for():
+    seen = []
 
     def watch(variants):
         seen.extend(layer.poisson_ratio.middle for one in variants for layer in one.layers)

@@ -18,7 +18,7 @@ SOFT = LayeredMedium([], HalfSpace(1000, 4e3, 0.49, KelvinVoigt(0.5)))
 
 @pytest.mark.parametrize("medium", [FOREARM, SOFT], ids=["forearm", "soft gel"])
 @pytest.mark.parametrize(("direction", "hertz"), [("normal", 300), ("tangential", 125)])
-def test_a_curve_is_the_solver_at_every_radius(medium: LayeredMedium, direction: str, hertz: float) -> None:
+def test_a_curve_is_the_solver_at_every_radius(medium, direction, hertz):
     a = 3.5e-3
     r = np.random.default_rng(3).uniform(a, 0.2, 900)
     r[:6] = 0.0, a, a + 1e-6, a + 1e-4, a + 2e-4, a / 2
@@ -30,7 +30,7 @@ def test_a_curve_is_the_solver_at_every_radius(medium: LayeredMedium, direction:
     assert np.max(np.abs(found - direct)) < 5e-4 * np.max(np.abs(direct))
 
 
-def test_few_radii_are_the_solver_itself_in_their_shape() -> None:
+def test_few_radii_are_the_solver_itself_in_their_shape():
     r = np.array([[0.02, 0.01], [0.01, 0.05]])
     found = components(FOREARM, UniformDisc(3.5e-3), 800.0, r, 1e-3)
     direct = FOREARM.response(UniformDisc(3.5e-3), 800.0, np.array([0.01, 0.02, 0.05]), rtol=1e-3)
@@ -40,7 +40,7 @@ def test_few_radii_are_the_solver_itself_in_their_shape() -> None:
 
 @pytest.mark.parametrize("drive", ["flat", "axial"])
 @pytest.mark.parametrize("reading", ["u", "u_z"])
-def test_decay_of_many_distances_is_that_of_each_alone(drive: str, reading: str) -> None:
+def test_decay_of_many_distances_is_that_of_each_alone(drive, reading):
     r = np.random.default_rng(4).uniform(7e-3, 0.3, (30, 20))
     whole = decay(UNIT, r, drive, 250.0, reading=reading)  # type: ignore[arg-type]
     rows = np.array([decay(UNIT, row, drive, 250.0, reading=reading) for row in r])  # type: ignore[arg-type]
@@ -48,7 +48,7 @@ def test_decay_of_many_distances_is_that_of_each_alone(drive: str, reading: str)
     assert decay(UNIT, np.array([7e-3]), drive, 250.0, reading=reading)[0] == pytest.approx(1.0)  # type: ignore[arg-type]
 
 
-def test_units_out_of_line_load_the_skin_as_pairs_do() -> None:
+def test_units_out_of_line_load_the_skin_as_pairs_do():
     """Twenty places of no regularity, by one curve: each pair as `influence` of the two alone, and G is reciprocal."""
     rng, places = np.random.default_rng(5), []
     while len(places) < 20:

@@ -1,7 +1,5 @@
 """An estimate by quasi-static moduli has the constants, errors, order and range of the nine units by such moduli."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import published_path
-from unitcad.attenuation.edge.measured import MeasuredTable, measured_table, whole_ratio
+from unitcad.attenuation.edge.measured import measured_table, whole_ratio
 from unitcad.catalogue import materials
 from unitcad.cli import app
 from unitcad.estimate_inputs import estimate_spec
@@ -20,14 +18,14 @@ PAPER = {"rule": 1.29, "divider": 1.76, "published": 2.02, "baseline": 1.33}
 """The scores by quasi-static moduli that docs/how-to/fit.md prints."""
 
 
-def leave_one_out(table: MeasuredTable) -> float:
+def leave_one_out(table):
     """Return the factor of the published model with a unit left out, fitted here by means."""
     off = np.log(table.levels) - np.log([np.exp(np.mean(np.log(published_path(one)))) for one in table.inputs])
     errors = [off[i] - np.mean(np.delete(off, i)) for i in range(off.size)]
     return float(np.exp(np.mean(np.abs(errors))))
 
 
-def test_the_errors_are_those_of_such_moduli() -> None:
+def test_the_errors_are_those_of_such_moduli():
     data = estimate_spec(load("embedded", SLOW))
     found, errors = data["answer"], data["table_error"]
     for model, factor in PAPER.items():
@@ -46,7 +44,7 @@ def test_the_errors_are_those_of_such_moduli() -> None:
     assert not any("slow pull" in line for line in dynamic["answer"]["details"])
 
 
-def test_the_rule_does_not_depend_on_the_source_at_a_measured_unit() -> None:
+def test_the_rule_does_not_depend_on_the_source_at_a_measured_unit():
     """Its border counts whole from the least ratio that was measured by such moduli."""
     silicones = materials()
     soft, stiff = (silicones[name].quasistatic_modulus_kpa for name in ("ecoflex-00-10", "dragon-skin-10-medium"))
@@ -58,7 +56,7 @@ def test_the_rule_does_not_depend_on_the_source_at_a_measured_unit() -> None:
     assert levels[0] == pytest.approx(levels[1], rel=1e-5)
 
 
-def test_the_level_has_the_constant_fitted_with_such_moduli() -> None:
+def test_the_level_has_the_constant_fitted_with_such_moduli():
     spec = load("embedded", SLOW[1:])
     table = measured_table("quasi-static")
     path = [np.exp(np.mean(np.log(published_path(one)))) for one in table.inputs]
@@ -68,7 +66,7 @@ def test_the_level_has_the_constant_fitted_with_such_moduli() -> None:
     assert level == pytest.approx(s * path[at], rel=1e-4)
 
 
-def test_the_terminal_and_the_json_say_it() -> None:
+def test_the_terminal_and_the_json_say_it():
     args = ["estimate", "embedded", "--set", "estimate.moduli=quasi-static"]
     assert "error: factor 2.0" in CliRunner().invoke(app, args).stdout
     assert "slow pull" in CliRunner().invoke(app, [*args, "--details"]).stdout

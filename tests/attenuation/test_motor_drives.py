@@ -18,7 +18,7 @@ BLOCKS = {drive: layered_block(variant) for drive, variant in DRIVEN.items()}
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
-def test_the_rotating_force_is_two_in_quadrature(angle: float) -> None:
+def test_the_rotating_force_is_two_in_quadrature(angle):
     """Twice the mean square of x, y and z over a turn is |u|^2, at every angle."""
     r, omega = np.array([7e-3, 12e-3, 37e-3]), 2 * np.pi * 125
     one = FOREARM.response(UniformDisc(3.5e-3, "tangential"), omega, r, rtol=1e-4)
@@ -40,7 +40,7 @@ def test_the_rotating_force_is_two_in_quadrature(angle: float) -> None:
     assert np.sqrt(2 * square) == pytest.approx(sizes, rel=2e-4)
 
 
-def test_the_motor_s_drive_stands_first_and_changes_nothing_else() -> None:
+def test_the_motor_s_drive_stands_first_and_changes_nothing_else():
     flat, axial = BLOCKS["flat"], BLOCKS["axial"]
     assert (list(flat["drives"]), list(axial["drives"])) == (["flat", "axial"], ["axial", "flat"])
     assert (flat["drive"], axial["drive"]) == ("flat", "axial")
@@ -54,7 +54,7 @@ def test_the_motor_s_drive_stands_first_and_changes_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("drive", ["flat", "axial"])
-def test_a_drive_s_curve(drive: str) -> None:
+def test_a_drive_s_curve(drive):
     """The components add up to |u|, the spread holds the value, and the other of the two is per newton of the same."""
     block = BLOCKS["flat"]
     found = block["drives"][drive]
@@ -69,7 +69,7 @@ def test_a_drive_s_curve(drive: str) -> None:
     assert sizes["flat"] / sizes["axial"] == pytest.approx(np.array(block["flat_over_axial_per_newton"]["value"]))
 
 
-def test_the_drive_is_the_part_s_where_the_spec_gives_none() -> None:
+def test_the_drive_is_the_part_s_where_the_spec_gives_none():
     assert {name for name, motor in motors().items() if motor.drive.value == "axial"} == {"VG1040003D"}
     plain = read(LEADLESS)
     lra = {"part": "VG1040003D"}
@@ -85,14 +85,14 @@ def test_the_drive_is_the_part_s_where_the_spec_gives_none() -> None:
     assert (refused.value.field, refused.value.nearest) == ("motor.drive", "axial")
 
 
-def test_a_mass_given_is_the_motor_s() -> None:
+def test_a_mass_given_is_the_motor_s():
     data = {**read("encapsulating"), "motor": {"part": "ours"}}
     data["motors"] = {"ours": {"like": "LCM0720A3463F", "mass_g": {"value": 0.5, "low": 0.4}}}
     mass = estimate_input(from_data(data)).geometry.motor_mass
     assert (mass.low, mass.value, mass.high) == pytest.approx((0.4e-3, 0.5e-3, None))
 
 
-def test_the_edge_level_does_not_know_the_drive() -> None:
+def test_the_edge_level_does_not_know_the_drive():
     flat, axial = (estimate_spec(load("encapsulating", [f"motor.drive={drive}"])) for drive in ("flat", "axial"))
     for model, block in flat["models"].items():
         assert block["edge_level"] == axial["models"][model]["edge_level"]

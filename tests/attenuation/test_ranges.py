@@ -1,7 +1,5 @@
 """The range of a level: against scipy's distributions and Gaussian regression by hand; wider the farther it is."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -12,23 +10,20 @@ from scipy import integrate, stats
 
 from unitcad.attenuation.edge.measured import LENGTHS, coordinates_of, measured_table, nearest
 from unitcad.attenuation.edge.models import leave_one_out_logs, stored
-from unitcad.attenuation.edge.ranges import OF_THE_KIND, Predictive, lead_of, predictive_of
-from unitcad.attenuation.inputs import EstimateInput
+from unitcad.attenuation.edge.ranges import OF_THE_KIND, Predictive, predictive_of
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
-T90 = stats.t.ppf(0.9, 7)
 
-
-def unit(design: str = "embedded", *changes: str) -> EstimateInput:
+def unit(design="embedded", *changes):
     return estimate_input(load(design, changes))
 
 
-def test_a_distribution_is_that_of_its_density_integrated() -> None:
+def test_a_distribution_is_that_of_its_density_integrated():
     made = Predictive(5, np.array([-1.0, 0.5, np.nan]), np.array([0.2, 1.4, 0.3]), np.array([0.6, 0.1, 0.3]))
     for row, level in ((0, 0.2), (0, 0.9), (1, 0.4), (1, 2.0)):
 
-        def density(x: float, row: int = row) -> float:
+        def density(x, row=row):
             scale = made.below[row] if x < made.centre[row] else made.above[row]
             return stats.t.pdf((x - made.centre[row]) / scale, 5) / scale
 
@@ -41,7 +36,7 @@ def test_a_distribution_is_that_of_its_density_integrated() -> None:
     assert np.isnan(made.at_most(0.1)[2])
 
 
-def test_a_measured_unit_has_half_its_residual_and_three_quarters_of_the_variance() -> None:
+def test_a_measured_unit_has_half_its_residual_and_three_quarters_of_the_variance():
     """Gaussian regression of one unit of its kind: weight 1/2, variance sigma^2 (1 - 1/4)."""
     s, q = stored()["rule"].values()
     off = leave_one_out_logs("rule", measured_table())
@@ -52,7 +47,7 @@ def test_a_measured_unit_has_half_its_residual_and_three_quarters_of_the_varianc
     assert found.degrees_of_freedom == 7
 
 
-def test_neighbours_of_a_measured_unit_are_drawn_towards_it() -> None:
+def test_neighbours_of_a_measured_unit_are_drawn_towards_it():
     """The measured 15.6 %, not the class's 14.5 %; less the farther away."""
     s, q = stored()["rule"].values()
     centres = [
@@ -76,17 +71,15 @@ def test_neighbours_of_a_measured_unit_are_drawn_towards_it() -> None:
         (("motor.drive=axial",), 0.0, 0.0),
     ],
 )
-def test_a_range_widens_with_the_distance_from_what_was_measured(
-    changes: tuple[str, ...], far: float, slope: float
-) -> None:
+def test_a_range_widens_with_the_distance_from_what_was_measured(changes, far, slope):
     base, found = predictive_of([unit()]), predictive_of([unit("embedded", *changes)])
     kind = OF_THE_KIND * math.exp(-(far**2) / 2)
     sigma2 = base.below[0] ** 2 / 0.75
     assert found.below[0] ** 2 == pytest.approx(sigma2 * (1 - kind**2) + (slope * far) ** 2, rel=1e-4)
 
 
-def test_moduli_outside_the_measured_ones_widen_it() -> None:
-    def width(kpa: float) -> float:
+def test_moduli_outside_the_measured_ones_widen_it():
+    def width(kpa):
         own = ["materials.own.like=ecoflex-00-10", f"materials.own.youngs_modulus_kpa={kpa}"]
         return float(predictive_of([unit("embedded", *own, "layers.0.material=own")]).below[0])
 
@@ -96,7 +89,7 @@ def test_moduli_outside_the_measured_ones_widen_it() -> None:
 
 
 @pytest.mark.parametrize("share", [0.06, 0.3, 0.5, 0.8, 0.94])
-def test_between_equal_moduli_and_the_measured_ratio_a_range_holds_both_ends(share: float) -> None:
+def test_between_equal_moduli_and_the_measured_ratio_a_range_holds_both_ends(share):
     s, q = stored()["rule"].values()
     kpa = 250 / (250 / 15) ** share
     own = ["materials.own.like=ecoflex-00-10", f"materials.own.youngs_modulus_kpa={kpa}"]
@@ -110,7 +103,7 @@ def test_between_equal_moduli_and_the_measured_ratio_a_range_holds_both_ends(sha
     assert sure.quantile(0.9)[0] < s / 2
 
 
-def test_the_measured_units_lie_at_the_origin_of_the_lengths() -> None:
+def test_the_measured_units_lie_at_the_origin_of_the_lengths():
     for design in ("embedded", "encapsulating"):
         assert np.abs(coordinates_of(unit(design))[:LENGTHS]).max() < 1e-4
     single = unit("single-embedded")
@@ -125,17 +118,21 @@ def test_the_measured_units_lie_at_the_origin_of_the_lengths() -> None:
         ("embedded", ("layers.0.material=ecoflex-00-30",), "embedded E10/D30", ["silicones"]),
         ("embedded", ("estimate.tissue=rigid-plate",), "embedded E10/D30", ["tissue"]),
         ("encapsulating", ("layers.1.cap_mm=0.8",), "encapsulating E10/D30", ["caps"]),
+        (  # stiff inside is not compared with soft inside, however close the moduli are
+            "embedded",
+            ("layers.0.material=dragon-skin-30", "layers.1.material=dragon-skin-10-medium"),
+            "embedded D10/E10",
+            ["silicones"],
+        ),
         ("three-layer", (), "encapsulating E10/D30", ["number of layers", "silicones", "diameter", "walls", "caps"]),
     ],
 )
-def test_the_nearest_measured_unit_and_what_differs(
-    template: str, changes: tuple[str, ...], unit_name: str, differs: list[str]
-) -> None:
+def test_the_nearest_measured_unit_and_what_differs(template, changes, unit_name, differs):
     found = nearest(unit(template, *changes))
     assert (found["unit"], [*found["differs_in"], *found["not_read"]]) == (unit_name, differs)
 
 
-def test_a_silicone_without_a_modulus_has_no_range_and_leaves_the_others_alone() -> None:
+def test_a_silicone_without_a_modulus_has_no_range_and_leaves_the_others_alone():
     known = unit("encapsulating")
     without = structs.replace(
         known, layers=(unit("encapsulating", "layers.0.material=ecoflex-00-50").layers[0], known.layers[1])
@@ -144,10 +141,3 @@ def test_a_silicone_without_a_modulus_has_no_range_and_leaves_the_others_alone()
     assert np.isfinite(found.at_most(0.06)[0])
     assert np.isnan(found.at_most(0.06)[1])
     assert found.centre[0] == predictive_of([known]).centre[0]
-
-
-def test_the_paper_leads_by_the_rule() -> None:
-    lead = lead_of()
-    assert lead.model == "rule"
-    assert len(lead.places) == len(lead.residuals) == 9
-    assert np.exp(lead.moduli) == pytest.approx([15e3, 355e3])

@@ -25,19 +25,19 @@ MASSES = np.array([patch.mass for patch in THREE])
 G = influence(FOREARM, THREE, OMEGA)
 
 
-def driven(drive: str, count: int = 3) -> np.ndarray:
+def driven(drive, count=3):
     forces = np.zeros((count, 3), dtype=complex)
     forces[0] = FORCES[drive]
     return forces
 
 
-def test_influence_is_reciprocal_and_takes_power() -> None:
+def test_influence_is_reciprocal_and_takes_power():
     g = G.reshape(9, 9)
     assert np.max(np.abs(g - g.T)) < 1e-3 * np.max(np.abs(g))
     assert np.linalg.eigvalsh((g.conj().T - g) / 2j).min() > 0
 
 
-def test_a_pair_is_the_mean_of_points_over_both_discs() -> None:
+def test_a_pair_is_the_mean_of_points_over_both_discs():
     """By point loads, whose transform is another: a newton spread over points of one disc, read at the other's."""
     rings, spokes = np.sqrt((np.arange(5) + 0.5) / 5), 2 * np.pi * np.arange(11) / 11
     disc = (rings[:, None] * np.exp(1j * spokes)).ravel()
@@ -55,7 +55,7 @@ def test_a_pair_is_the_mean_of_points_over_both_discs() -> None:
     assert abs(np.mean(u_r * sin**2 - u_theta * cos**2) - G[1, 1, 0, 1]) < 1e-3 * size
 
 
-def test_own_motion_is_the_closed_form_on_a_half_space() -> None:
+def test_own_motion_is_the_closed_form_on_a_half_space():
     """Mean over a disc under its own uniform traction: 16 (1 - nu^2) / (3 pi^2 E a) a newton, sideways with C_sh."""
     a, e, nu = 6e-3, 20e3, 0.4
     g = influence(LayeredMedium([], HalfSpace(1000, e, nu)), (Patch(0, 0, a, 0.0),), 0.0)[0, :, 0, :]
@@ -66,7 +66,7 @@ def test_own_motion_is_the_closed_form_on_a_half_space() -> None:
 
 
 @pytest.mark.parametrize("drive", ["flat", "axial"])
-def test_masses_against_the_stiffness_of_the_skin(drive: str) -> None:
+def test_masses_against_the_stiffness_of_the_skin(drive):
     """The same by another way: the skin's dynamic stiffness, G inverted, with the masses on its diagonal."""
     stiffness = np.linalg.inv(G.reshape(9, 9)) - OMEGA**2 * np.diag(np.repeat(MASSES, 3))
     expected = np.linalg.solve(stiffness, driven(drive).ravel()).reshape(3, 3)
@@ -74,7 +74,7 @@ def test_masses_against_the_stiffness_of_the_skin(drive: str) -> None:
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-12 * np.max(np.abs(expected)))
 
 
-def test_masses_take_no_power() -> None:
+def test_masses_take_no_power():
     """What the force gives over a period, the skin takes: the masses only swing."""
     forces = driven("flat")
     u = motion(G, MASSES, forces, OMEGA)
@@ -88,7 +88,7 @@ def test_masses_take_no_power() -> None:
 
 
 @pytest.mark.parametrize(("hertz", "change"), [(100, 1.02), (150, 0.53)])
-def test_transfer_to_a_neighbour_as_once_measured(hertz: float, change: float) -> None:
+def test_transfer_to_a_neighbour_as_once_measured(hertz, change):
     """A hundred units of 1.2 g, 14 mm wide, 16 mm apart; along the normal only, read at the others' middles."""
     at = np.arange(10) * 0.016
     x, y = (grid.ravel() for grid in np.meshgrid(at, at))
@@ -104,7 +104,7 @@ def test_transfer_to_a_neighbour_as_once_measured(hertz: float, change: float) -
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "embedded", "three-layer"])
-def test_mass_is_that_of_the_drawn_silicone_and_the_motor(name: str) -> None:
+def test_mass_is_that_of_the_drawn_silicone_and_the_motor(name):
     spec = load(name)
     variant = estimate_input(spec)
     solids = {one.name: realise(one.shape, 128) for one in unit_bodies(spec)}
@@ -114,7 +114,7 @@ def test_mass_is_that_of_the_drawn_silicone_and_the_motor(name: str) -> None:
     assert mass.ends == pytest.approx([mass.value - motor.middle + end for end in motor.ends])
 
 
-def test_neighbours_refuse_what_can_not_stand_side_by_side() -> None:
+def test_neighbours_refuse_what_can_not_stand_side_by_side():
     with pytest.raises(Refusal, match="overlap"):
         influence(FOREARM, (THREE[0], Patch(0.011, 0, 5e-3, 0.0)), OMEGA)
     other = estimate_input(
@@ -133,7 +133,7 @@ def test_neighbours_refuse_what_can_not_stand_side_by_side() -> None:
     assert (refused.value.field, refused.value.nearest) == ("estimate.tissue", "forearm")
 
 
-def test_the_range_holds_a_softer_body_and_another_frequency() -> None:
+def test_the_range_holds_a_softer_body_and_another_frequency():
     """The ends of one kind, computed as nominal values of another unit."""
     row = neighbours_block([UNIT, UNIT], 0.016)["transfer"][0]["with_masses"]
     soft = tuple(replace(layer, shear_modulus=Quantity(layer.shear_modulus.ends[0])) for layer in UNIT.tissue)
@@ -145,7 +145,7 @@ def test_the_range_holds_a_softer_body_and_another_frequency() -> None:
     assert row["high"] - row["low"] > fixed["high"] - fixed["low"]
 
 
-def test_command_gives_the_neighbours() -> None:
+def test_command_gives_the_neighbours():
     pair = ["estimate", "encapsulating", "encapsulating", "--model", "divider"]
     done = CliRunner().invoke(app, [*pair, "--pitch", "16", "--frequency", "100:300:200", "--json"])
     found = json.loads(done.stdout)["neighbours"]

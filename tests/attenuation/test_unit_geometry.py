@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from unitcad.attenuation.inputs import Geometry, Quantity
+from unitcad.attenuation.inputs import Quantity
 from unitcad.designs import unit_bodies
 from unitcad.estimate_inputs import estimate_input
 from unitcad.kernels.mesh import bounds, realise
@@ -21,14 +21,14 @@ SPECS = {
 }
 
 
-def box(solid) -> tuple[float, float]:
+def box(solid):
     """Return the largest x and z of a body, mm."""
     ends = bounds(solid)
     return ends[4], ends[5]
 
 
 @pytest.mark.parametrize("name", SPECS)
-def test_lengths_are_those_of_the_drawn_bodies(name: str) -> None:
+def test_lengths_are_those_of_the_drawn_bodies(name):
     spec = load(name.split(" ")[0], list(SPECS[name]))
     geometry = estimate_input(spec).geometry
     solids = {body.name: realise(body.shape, 128) for body in unit_bodies(spec)}
@@ -42,7 +42,7 @@ def test_lengths_are_those_of_the_drawn_bodies(name: str) -> None:
     assert volume(geometry) * 1e9 == pytest.approx(drawn, rel=0.03)  # the exit of tail or wires is not in it
 
 
-def volume(geometry: Geometry) -> float:
+def volume(geometry):
     """Return the silicone's volume, m3: the outermost layer's cylinder less cavity."""
     cavity = math.pi * geometry.cavity_radius**2 * geometry.core_height
     closed = sum(layer.cap for layer in geometry.layers)
@@ -50,7 +50,7 @@ def volume(geometry: Geometry) -> float:
     return math.pi * geometry.layers[-1].outer_radius ** 2 * geometry.layers[-1].top - cavity
 
 
-def test_the_motor_s_mass_is_a_range_and_says_that_it_is_assumed() -> None:
+def test_the_motor_s_mass_is_a_range_and_says_that_it_is_assumed():
     mass = estimate_input(load("encapsulating")).geometry.motor_mass
     assert isinstance(mass, Quantity)
     assert mass.low is not None

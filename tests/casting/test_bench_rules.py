@@ -1,8 +1,5 @@
 """Every rule of the procedure: the shipped sets keep it, and a planted fault breaks it."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -10,7 +7,7 @@ from casting_rules import broken_rules
 
 from tests.sample_bodies import LEADLESS
 from unitcad.casting.pouring import LEVEL_AGAIN, TACK
-from unitcad.casting.procedure import Pour, Procedure, procedure
+from unitcad.casting.procedure import procedure
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, templates
 
@@ -21,37 +18,37 @@ RESIN = ("three-layer", "moulds.printer=sla")
 LOOSE = (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]")
 
 
-def casting(*source: str) -> Procedure:
+def casting(*source):
     moulds = MouldSet(load(source[0], list(source[1:])))
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
 @pytest.mark.parametrize("source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS], ids=" ".join)
-def test_every_set_keeps_every_rule(source: tuple[str, ...]) -> None:
+def test_every_set_keeps_every_rule(source):
     assert broken_rules(casting(*source)) == []
 
 
-def of_first_pour(made: Procedure, change: Callable[[Pour], Pour]) -> Procedure:
+def of_first_pour(made, change):
     return replace(made, pours=(change(made.pours[0]), *made.pours[1:]))
 
 
-def without_pictures(made: Procedure) -> Procedure:
+def without_pictures(made):
     return of_first_pour(made, lambda pour: replace(pour, steps=tuple(replace(s, picture="") for s in pour.steps)))
 
 
-def unlevelled(made: Procedure) -> Procedure:
+def unlevelled(made):
     return replace(made, preparation=tuple(step for step in made.preparation if "Level" not in step.title))
 
 
-def opened_first(made: Procedure) -> Procedure:
-    def change(pour: Pour) -> Pour:
+def opened_first(made):
+    def change(pour):
         cure = [step for step in pour.steps if step.kind == "cure"]
         return replace(pour, steps=(*(step for step in pour.steps if step.kind != "cure"), *cure))
 
     return of_first_pour(made, change)
 
 
-def short_cure(made: Procedure) -> Procedure:
+def short_cure(made):
     return of_first_pour(
         made,
         lambda pour: replace(
@@ -60,75 +57,75 @@ def short_cure(made: Procedure) -> Procedure:
     )
 
 
-def untested_cure(made: Procedure) -> Procedure:
+def untested_cure(made):
     return of_first_pour(
         made, lambda pour: replace(pour, steps=tuple(replace(s, text=s.text.replace(TACK, "")) for s in pour.steps))
     )
 
 
-def adhesive_left_wet(made: Procedure) -> Procedure:
+def adhesive_left_wet(made):
     return replace(made, assembly=made.assembly[:-1])
 
 
-def too_little(made: Procedure) -> Procedure:
+def too_little(made):
     return of_first_pour(made, lambda pour: replace(pour, part_a_g=0.05, part_b_g=0.05))
 
 
-def syringe_forgotten(made: Procedure) -> Procedure:
+def syringe_forgotten(made):
     return of_first_pour(
         made, lambda pour: replace(pour, figures=tuple(f for f in pour.figures if "syringe" not in f.name))
     )
 
 
-def no_grip(made: Procedure) -> Procedure:
+def no_grip(made):
     return replace(made, preparation=tuple(replace(s, text="") for s in made.preparation))
 
 
-def reworded(made: Procedure, old: str, new: str) -> Procedure:
-    def change(pour: Pour) -> Pour:
+def reworded(made, old, new):
+    def change(pour):
         return replace(pour, steps=tuple(replace(s, text=s.text.replace(old, new)) for s in pour.steps))
 
     return replace(made, pours=tuple(map(change, made.pours)))
 
 
-def unpropped(made: Procedure) -> Procedure:
+def unpropped(made):
     return reworded(made, "stacked card", "nothing")
 
 
-def looks_through_layer_1(made: Procedure) -> Procedure:
+def looks_through_layer_1(made):
     return reworded(made, "under Layer 1,", "no gap at the core, none under it,")
 
 
-def spatula_forgotten(made: Procedure) -> Procedure:
+def spatula_forgotten(made):
     return replace(made, bill=tuple(item for item in made.bill if "spatula" not in item.item))
 
 
-def varnish_forgotten(made: Procedure) -> Procedure:
+def varnish_forgotten(made):
     return replace(made, bill=tuple(item for item in made.bill if "varnish" not in item.item))
 
 
-def no_time_to_prepare(made: Procedure) -> Procedure:
+def no_time_to_prepare(made):
     return replace(made, preparation=tuple(replace(s, minutes=0.0, wait_min=0.0) for s in made.preparation))
 
 
-def ring_not_bought(made: Procedure) -> Procedure:
+def ring_not_bought(made):
     """The bill of the pours alone: 2 g of Layer 1's silicone, half of each part, are missing."""
     inner = made.pours[0].material
     bill = [replace(i, quantity=i.quantity - 1.0) if i.item.startswith(f"{inner} part") else i for i in made.bill]
     return replace(made, bill=tuple(bill))
 
 
-def adhesive_in_a_hurry(made: Procedure) -> Procedure:
+def adhesive_in_a_hurry(made):
     *steps, cure = made.assembly
     return replace(made, assembly=(*steps, replace(cure, wait_min=60 * made.pours[-1].cure_h)))
 
 
-def tilted_by_tape(made: Procedure) -> Procedure:
+def tilted_by_tape(made):
     return reworded(made, LEVEL_AGAIN, "")
 
 
-def coated_before_mixed(made: Procedure) -> Procedure:
-    def change(pour: Pour) -> Pour:
+def coated_before_mixed(made):
+    def change(pour):
         mixing = [step for step in pour.steps if step.kind in ("weigh", "mix")]
         rest = [step for step in pour.steps if step.kind not in ("weigh", "mix")]
         return replace(pour, steps=(*rest, *mixing))
@@ -136,10 +133,10 @@ def coated_before_mixed(made: Procedure) -> Procedure:
     return replace(made, pours=tuple(map(change, made.pours)))
 
 
-def greased_too_late(made: Procedure) -> Procedure:
+def greased_too_late(made):
     """The order that a cup already on its base makes impossible."""
 
-    def change(pour: Pour) -> Pour:
+    def change(pour):
         grease = [step for step in pour.steps if step.title == "Grease the flanks"]
         rest = [step for step in pour.steps if step.title != "Grease the flanks"]
         on = next(i for i, step in enumerate(rest) if step.title == f"Cup {pour.index} on")
@@ -148,11 +145,11 @@ def greased_too_late(made: Procedure) -> Procedure:
     return replace(made, pours=tuple(map(change, made.pours)))
 
 
-def greased_with_nothing_named(made: Procedure) -> Procedure:
+def greased_with_nothing_named(made):
     return reworded(made, "petroleum jelly", "something")
 
 
-def pulled_on_the_bench(made: Procedure) -> Procedure:
+def pulled_on_the_bench(made):
     out = "Lift the mould off the bench"
     return replace(made, release=tuple(replace(s, text=s.text.removeprefix(out)) for s in made.release))
 
@@ -182,8 +179,6 @@ PLANTED = {
 
 
 @pytest.mark.parametrize(("source", "plant", "said"), PLANTED.values(), ids=PLANTED)
-def test_a_planted_fault_breaks_its_rule(
-    source: tuple[str, ...], plant: Callable[[Procedure], Procedure], said: str
-) -> None:
+def test_a_planted_fault_breaks_its_rule(source, plant, said):
     faults = broken_rules(plant(casting(*source)))
     assert any(said in fault for fault in faults), faults

@@ -1,20 +1,16 @@
 """The procedure's pictures: one for each step that names one, each piece seen, the same bytes each time."""
 
-from __future__ import annotations
-
 import io
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from unitcad.casting.drawings import ARROW, BAND, CARD, TAPE, tongue_prop
-from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.procedure import procedure
 from unitcad.casting.views import SIZE, View, picture_path, pictures, views
-from unitcad.export.raster import Layer, Surface, aim, finish, render
+from unitcad.export.raster import Surface, aim, finish, render
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
@@ -28,27 +24,24 @@ SETS = [
 ]
 
 
-Planned = Callable[..., tuple[MouldSet, Procedure]]
-
-
-def titles(casting: Procedure) -> list[list[str]]:
+def titles(casting):
     """The titles of each part of a procedure."""
     parts = (casting.preparation, *(pour.steps for pour in casting.pours), casting.release, casting.assembly)
     return [[step.title for step in part] for part in parts]
 
 
-def planned(*source: str) -> tuple[MouldSet, Procedure]:
+def planned(*source):
     moulds = MouldSet(load(source[0], list(source[1:])))
     return moulds, procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
 @pytest.fixture(name="planned")
-def _of_specs() -> Planned:
+def _of_specs():
     return planned
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source: tuple[str, ...], planned: Planned) -> None:
+def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source, planned):
     moulds, casting = planned(*source)
     steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
     steps += [*casting.release, *casting.assembly]
@@ -58,7 +51,7 @@ def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source: tup
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_views_name_pieces_that_there_are(source: tuple[str, ...], planned: Planned) -> None:
+def test_views_name_pieces_that_there_are(source, planned):
     moulds, _ = planned(*source)
     plan = moulds.plan
     tools = {body.name for body in (*plan.tools, *plan.pieces, *plan.steps[-1].inserts)} | {
@@ -70,7 +63,7 @@ def test_views_name_pieces_that_there_are(source: tuple[str, ...], planned: Plan
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ...], planned: Planned) -> None:
+def test_a_picture_shows_the_state_that_its_words_speak_of(source, planned):
     """Nothing moves while it cures, tape stays until it is taken off, filament comes after the dry fit."""
     moulds, casting = planned(*source)
     shown = {picture_path(name): view for name, view in views(moulds).items()}
@@ -90,11 +83,11 @@ def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ..
     assert not any(part.name.startswith("filament") for part in shown[fit.picture].parts)
 
 
-def seen(content: bytes) -> np.ndarray:
+def seen(content):
     return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
 
 
-def hues(content: bytes, colour: tuple[float, float, float]) -> int:
+def hues(content, colour):
     """How many pixels have the hue of a colour, light or dark."""
     pixels = seen(content).reshape(-1, 3)
     own = np.array(colour) / np.linalg.norm(colour)
@@ -102,7 +95,7 @@ def hues(content: bytes, colour: tuple[float, float, float]) -> int:
     return int((((pixels @ own) > 0.9995 * bright) & (bright > 60)).sum())
 
 
-def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte() -> None:
+def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte():
     moulds, _ = planned("encapsulating")
     drawn, shown = pictures(moulds), views(moulds)
     assert drawn == pictures(MouldSet(moulds.spec))
@@ -118,11 +111,11 @@ def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte() -> None:
     assert there == {name for name, view in shown.items() if any(part.name == "tongue" for part in view.parts)}
 
 
-def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:
+def test_a_nearer_body_hides_one_behind_it_whatever_the_order():
     eye, points = (0.0, -1.0, 0.0), np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])
     camera = aim(eye, points, (40, 40))
 
-    def drawn(y: float, colour: tuple[float, float, float]) -> Layer:
+    def drawn(y, colour):
         return render(Surface(*arrays(realise(moved(box(-1, 1, -0.5, 0.5, -1, 1), y=y), 32)), colour), camera)
 
     near, far = drawn(-1, (1, 0, 0)), drawn(1, (0, 1, 0))
@@ -136,7 +129,7 @@ def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_what_words_name_is_named_in_the_picture(source: tuple[str, ...], planned: Planned) -> None:
+def test_what_words_name_is_named_in_the_picture(source, planned):
     """What a step speaks of beside the pieces stands in its picture under the same name."""
     moulds, casting = planned(*source)
     shown = {picture_path(name): view for name, view in views(moulds).items()}
@@ -162,7 +155,7 @@ def test_what_words_name_is_named_in_the_picture(source: tuple[str, ...], planne
 
 @pytest.mark.parametrize("cavities", ["[1,1]", "[2,2]", "[1,3]"])
 @pytest.mark.parametrize("name", ["embedded", "encapsulating"])
-def test_sprue_and_vent_point_at_the_silicone_in_them(name: str, cavities: str) -> None:
+def test_sprue_and_vent_point_at_the_silicone_in_them(name, cavities):
     moulds, _ = planned(name, "moulds.pour=injected", f"moulds.cavities={cavities}")
     for step in moulds.plan.steps:
         count = len(step.channels) // len(moulds.plan.layout.cells)
@@ -176,7 +169,7 @@ def test_sprue_and_vent_point_at_the_silicone_in_them(name: str, cavities: str) 
                 assert (held.index(True) % count == 0) == (word == "sprue")
 
 
-def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:
+def test_a_build_writes_the_pictures_and_names_them(tmp_path):
     done = build(load("embedded"), tmp_path, only=("casting",), check=False)
     text = (done.folder / "casting.md").read_text("utf-8")
     listed = {path for path in done.manifest["files"] if path.startswith("steps/")}
@@ -186,12 +179,12 @@ def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:
     assert json.loads((done.folder / "casting.json").read_bytes())["printing"]["cm3"] > 9
 
 
-def test_a_view_is_data() -> None:
+def test_a_view_is_data():
     """Under open pours nothing is meshed to name the pictures."""
     assert all(isinstance(view, View) for view in views(planned("encapsulating")[0]).values())
 
 
-def test_what_strikes_off_passes_what_stands_on_the_base() -> None:
+def test_what_strikes_off_passes_what_stands_on_the_base():
     """Strap slots' supports stand above rim 1: a strip takes the blade's place, and its way is free."""
     moulds, casting = planned("templates/custom/strap-lugs.toml")
     base = realise(moulds.plan.of_kind("base")[0].shape, 32)
@@ -217,7 +210,7 @@ def test_what_strikes_off_passes_what_stands_on_the_base() -> None:
     ],
     ids=" ".join,
 )
-def test_tongues_lie_on_ledge_and_pad(source: tuple[str, ...]) -> None:
+def test_tongues_lie_on_ledge_and_pad(source):
     """Each tongue's centre of mass lies over its pad, which touches it and stands on the plate without tipping."""
     moulds, _ = planned(*source)
     prop, base = tongue_prop(moulds), realise(moulds.plan.of_kind("base")[0].shape, 32)
@@ -239,18 +232,18 @@ def test_tongues_lie_on_ledge_and_pad(source: tuple[str, ...]) -> None:
         assert any(p[0] < centre < p[3] and abs(p[5] - z0) < 0.01 for p in (pad.bounding_box() for pad in pads))
 
 
-def _area(loop: np.ndarray) -> float:
+def _area(loop):
     x, y = loop.T
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
-def _moment(loop: np.ndarray) -> float:
+def _moment(loop):
     x, y = loop.T
     u, v = np.roll(x, -1), np.roll(y, -1)
     return float(((x + u) * (x * v - u * y)).sum() / 6)
 
 
-def test_a_tail_that_leads_through_a_closed_slot_is_shown_in_place_only() -> None:
+def test_a_tail_that_leads_through_a_closed_slot_is_shown_in_place_only():
     """A picture of the parts apart would show a straight way that the tail does not have."""
     moulds, casting = planned("encapsulating")
     assert "motor-in" not in views(moulds)
@@ -258,7 +251,7 @@ def test_a_tail_that_leads_through_a_closed_slot_is_shown_in_place_only() -> Non
     assert "motor-in" in views(planned("embedded")[0])
 
 
-def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes() -> None:
+def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes():
     moulds, casting = planned("encapsulating", "moulds.printer=sla")
     tongue = moulds.solids["tongue"].bounding_box()
     exit = moulds.dimensions.exit

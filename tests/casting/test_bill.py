@@ -1,14 +1,12 @@
 """The bill: everything that a step takes, and the number of every piece."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
 
 from tests.sample_bodies import LEADLESS
 from unitcad.casting.bill import plural
-from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.procedure import procedure
 from unitcad.casting.procedure_text import to_markdown
 from unitcad.casting.views import BenchPictures
 from unitcad.catalogue import materials
@@ -19,21 +17,21 @@ from unitcad.validation import load, warnings
 LOOSE = (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
 
 
-def moulds_of(*source: str) -> MouldSet:
+def moulds_of(*source):
     return MouldSet(load(source[0], list(source[1:])))
 
 
-def casting(*source: str) -> Procedure:
+def casting(*source):
     moulds = moulds_of(*source)
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
-def quantities(made: Procedure) -> dict[str, float]:
+def quantities(made):
     return {item.item: item.quantity for item in made.bill}
 
 
 @pytest.mark.parametrize("cells", [1, 6])
-def test_the_silicone_of_a_filled_ring_is_bought(cells: int) -> None:
+def test_the_silicone_of_a_filled_ring_is_bought(cells):
     """Its volume is the difference of two drawn units: Layer 1 up to the motor, and with a ring of air."""
     gang = f"moulds.cavities=[1,{cells}]"
     drawn = [MouldSet(load(LOOSE[0], [*LOOSE[1:3], f"motor.fill={fill}"])) for fill in ("true", "false")]
@@ -48,7 +46,7 @@ def test_the_silicone_of_a_filled_ring_is_bought(cells: int) -> None:
     assert bought["mixing cups and sticks"] == 2
 
 
-def test_a_ring_s_silicone_cures_and_is_no_smear() -> None:
+def test_a_ring_s_silicone_cures_and_is_no_smear():
     made = casting(*LOOSE)
     (cure,) = (step for step in made.assembly if step.kind == "cure")
     assert cure.title == "Let the ring cure"
@@ -56,12 +54,12 @@ def test_a_ring_s_silicone_cures_and_is_no_smear() -> None:
     assert cure.wait_min == 60 * made.pours[0].cure_h
 
 
-def test_a_pin_for_bubbles_is_bought_for_an_open_pour_only() -> None:
+def test_a_pin_for_bubbles_is_bought_for_an_open_pour_only():
     assert "pin" in quantities(casting("encapsulating"))
     assert "pin" not in quantities(casting("encapsulating", "moulds.pour=injected"))
 
 
-def test_pictures_and_bill_count_pieces() -> None:
+def test_pictures_and_bill_count_pieces():
     gang = ("encapsulating", "moulds.cavities=[2,3]")
     assert quantities(casting(*gang))["filament"] == 6
     bench = BenchPictures(moulds_of(*gang))
@@ -78,7 +76,7 @@ def test_pictures_and_bill_count_pieces() -> None:
         (("casting.room_c=43",), False, True),
     ],
 )
-def test_a_pour_s_faults_are_data_and_its_words_agree(change: tuple[str, ...], stays: bool, late: bool) -> None:
+def test_a_pour_s_faults_are_data_and_its_words_agree(change, stays, late):
     pours = casting("encapsulating", *change).pours
     for pour in pours:
         assert pour.bubbles_stay == ("bubbles stay" in pour.verdict)
@@ -97,13 +95,13 @@ def test_a_pour_s_faults_are_data_and_its_words_agree(change: tuple[str, ...], s
         ({"part": "VC0720B001F", "diameter_mm": 6.0}, "own motor", "6 x 2 mm"),
     ],
 )
-def test_a_motor_of_other_sizes_has_no_part_number(motor: dict[str, str | float], item: str, note: str) -> None:
+def test_a_motor_of_other_sizes_has_no_part_number(motor, item, note):
     bill = {line.item: line.note for line in casting("embedded", *(f"motor.{k}={v}" for k, v in motor.items())).bill}
     assert bill[item] == note
     assert len({"own motor", "LCM0720A3463F", "VC0720B001F"} & bill.keys()) == 1
 
 
-def test_the_sheet_begins_with_what_to_measure() -> None:
+def test_the_sheet_begins_with_what_to_measure():
     """Step 0 has the lengths of the bought parts, as drawn, and a command that builds with them."""
     spec = load("encapsulating")
     assert spec.fpcb
@@ -125,13 +123,13 @@ def test_the_sheet_begins_with_what_to_measure() -> None:
     assert "fpcb.thickness_mm" not in wires
 
 
-def test_several_of_an_item_are_plural() -> None:
+def test_several_of_an_item_are_plural():
     names = ["flexible circuit", "pad of stacked card", "filament, straight", "LCM0720A3463F"]
     several = ["flexible circuits", "pads of stacked card", "filaments, straight", "LCM0720A3463F"]
     assert [plural(name) for name in names] == several
 
 
-def test_a_length_that_is_given_is_not_assumed() -> None:
+def test_a_length_that_is_given_is_not_assumed():
     """Planted: what the catalogue assumes is typed as measured."""
     measured = casting("encapsulating", "motor.thickness_mm=2.3", "fpcb.thickness_mm=0.13")
     assert not any(size.assumed for size in measured.printing.sizes)
@@ -139,7 +137,7 @@ def test_a_length_that_is_given_is_not_assumed() -> None:
     assert assumed_lengths(load("embedded", ["motor.part=VC0720B001F"])).keys() == {"fpcb.thickness_mm"}
 
 
-def test_both_designs_fix_the_motor_by_the_same_words_and_bill() -> None:
+def test_both_designs_fix_the_motor_by_the_same_words_and_bill():
     fixed = {name: casting(name) for name in ("encapsulating", "embedded")}
     sentences = {
         re.sub(r"where it touches [^:]*:", "where it touches ...:", step.text.split("thinly")[1].split(".")[0])
@@ -153,7 +151,7 @@ def test_both_designs_fix_the_motor_by_the_same_words_and_bill() -> None:
         assert made.assembly[-1].wait_min == 24 * 60
 
 
-def test_warnings_lead_the_sheet() -> None:
+def test_warnings_lead_the_sheet():
     """Planted: a closed cavity, and a roof of 25 mm; the sheets of the templates have none."""
     for source, words in (((LEADLESS,), "no way out"), (("encapsulating", "diameter_mm=30"), "ring of air of 9 mm")):
         text = to_markdown(casting(*source))
@@ -161,7 +159,7 @@ def test_warnings_lead_the_sheet() -> None:
     assert "Warning" not in to_markdown(casting("encapsulating"))
 
 
-def test_a_cavity_without_a_way_out_for_leads_is_a_warning() -> None:
+def test_a_cavity_without_a_way_out_for_leads_is_a_warning():
     leads = warnings(load(LEADLESS))
     assert "no way out for the motor's leads" in leads[0]
     open_ring = load(LOOSE[0], LOOSE[1:])  # leads leave upwards

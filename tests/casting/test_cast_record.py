@@ -1,11 +1,7 @@
 """The cast record: what is accepted comes back the same; what is not is refused by its field."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from cast_records import spec_of, to_json
@@ -18,7 +14,7 @@ from unitcad.spec import spec_hash, to_data
 from unitcad.validation import load
 
 
-def data() -> dict[str, Any]:
+def data():
     spec = load("encapsulating")
     return {
         "format": FORMAT,
@@ -38,7 +34,7 @@ def data() -> dict[str, Any]:
     }
 
 
-def test_a_record_comes_back_the_same(tmp_path: Path) -> None:
+def test_a_record_comes_back_the_same(tmp_path):
     record = cast_record(data())
     (tmp_path / "a.cast.json").write_text(to_json(record), encoding="utf-8")
     assert read_cast_record(tmp_path / "a.cast.json") == record
@@ -48,8 +44,7 @@ def test_a_record_comes_back_the_same(tmp_path: Path) -> None:
     assert (first.wall_mm(1), first.wall_mm(2), record.unit(3)) == ((1.2, 1.3), (), None)
 
 
-Change = Callable[[dict[str, Any]], Any]
-FAULTS: dict[str, tuple[Change, str]] = {
+FAULTS = {
     "version": (lambda d: d.update(version=2), "version"),
     "unknown key": (lambda d: d.update(spec_nme="x"), "spec_nme"),
     "hash": (lambda d: d.update(spec_hash="XYZ"), "spec_hash"),
@@ -69,7 +64,7 @@ FAULTS: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize(("change", "field"), FAULTS.values(), ids=FAULTS)
-def test_a_fault_is_refused_by_its_field(change: Change, field: str) -> None:
+def test_a_fault_is_refused_by_its_field(change, field):
     faulty = data()
     change(faulty)
     with pytest.raises(Refusal) as refused:
@@ -77,7 +72,7 @@ def test_a_fault_is_refused_by_its_field(change: Change, field: str) -> None:
     assert refused.value.field == field
 
 
-def test_the_nearest_time_is_accepted() -> None:
+def test_the_nearest_time_is_accepted():
     faulty = data()
     faulty["pours"][0]["mixed_at"] = "2026-03-14T09:30"
     with pytest.raises(Refusal) as refused:
@@ -87,13 +82,13 @@ def test_the_nearest_time_is_accepted() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "[]", "7", '{"format": "other"}', '{"a": NaN}', "[" * 5000])
-def test_another_file_is_no_record(text: str, tmp_path: Path) -> None:
+def test_another_file_is_no_record(text, tmp_path):
     (tmp_path / "a.json").write_text(text, encoding="utf-8")
     with pytest.raises(UnitcadError, match=r"a\.json"):
         read_cast_record(tmp_path / "a.json")
 
 
-def test_a_large_file_and_a_link_are_refused(tmp_path: Path) -> None:
+def test_a_large_file_and_a_link_are_refused(tmp_path):
     (tmp_path / "large.json").write_text(" " * 1_000_001, encoding="utf-8")
     with pytest.raises(UnitcadError, match="larger than 1 MB"):
         read_cast_record(tmp_path / "large.json")
@@ -102,18 +97,18 @@ def test_a_large_file_and_a_link_are_refused(tmp_path: Path) -> None:
         read_cast_record(tmp_path / "link.json", links=False)
 
 
-def test_a_record_without_its_spec_says_so() -> None:
+def test_a_record_without_its_spec_says_so():
     with pytest.raises(Refusal, match="spec"):
         spec_of(cast_record({key: value for key, value in data().items() if key != "spec"}))
 
 
-def test_the_example_of_the_docs_is_a_record() -> None:
+def test_the_example_of_the_docs_is_a_record():
     text = (Path(__file__).parents[2] / "docs" / "how-to" / "print-and-cast.md").read_text("utf-8")
     example = text.split("## Write a cast record")[1].split("```json\n")[1].split("```")[0]
     assert cast_record(json.loads(example)).units[0].wall_mm(1) == (1.2, 1.3)
 
 
-def test_the_schema_is_offered() -> None:
+def test_the_schema_is_offered():
     done = CliRunner().invoke(app, ["schema", "cast-record"])
     schema = json.loads(done.stdout)
     assert schema["title"] == "unitcad cast record"
@@ -121,9 +116,7 @@ def test_the_schema_is_offered() -> None:
 
 
 @pytest.mark.parametrize(("text", "said"), [("{", "JSON"), ('{"format": "x"}', "format"), ("[]", "no table")])
-def test_report_refuses_a_folder_with_a_damaged_record(
-    text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_report_refuses_a_folder_with_a_damaged_record(text, said, tmp_path, monkeypatch, capsys):
     """The record is what somebody put there: its fault is an error that names it, and no page is written."""
     (tmp_path / "manifest.json").write_text("{}")
     (tmp_path / "a-2026-03-14.cast.json").write_text(text)

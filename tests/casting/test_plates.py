@@ -1,7 +1,5 @@
 """The printer's plates: every piece once, all within the bed, none on another."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from itertools import combinations
@@ -17,7 +15,7 @@ from unitcad.pipeline.plan import threemf_content
 from unitcad.validation import load
 
 
-def _gang(*settings: str) -> MouldSet:
+def _gang(*settings):
     return MouldSet(load(LEADLESS, settings))
 
 
@@ -30,11 +28,11 @@ SETS = {
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_all_pieces_lie_apart_on_the_bed(name: str) -> None:
+def test_all_pieces_lie_apart_on_the_bed(name):
     lie_apart(SETS[name]())
 
 
-def lie_apart(moulds: MouldSet) -> None:
+def lie_apart(moulds):
     """Check that every piece of a set lies within the bed, once and on no other."""
     plates = mould_plates(moulds)
     printed = [piece.name for piece in moulds.plan.pieces if piece.made == "printed"]
@@ -50,7 +48,7 @@ def lie_apart(moulds: MouldSet) -> None:
             assert (one[1] < other[0]).any() or (other[1] < one[0]).any()
 
 
-def _boxes(package: bytes) -> list[np.ndarray]:
+def _boxes(package):
     """The low and the high corner in plan of every item of a 3MF."""
     core = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
     model = ElementTree.fromstring(zipfile.ZipFile(io.BytesIO(package)).read("3D/3dmodel.model"))
@@ -69,7 +67,7 @@ def _boxes(package: bytes) -> list[np.ndarray]:
     return found
 
 
-def test_a_piece_goes_on_the_first_plate_with_room() -> None:
+def test_a_piece_goes_on_the_first_plate_with_room():
     plates = mould_plates(SETS["as wide as the bed"]())
     assert [[body.name for body in plate] for plate in plates.values()] == [["base", "blade"], ["cup1"], ["cup2"]]
     assert list(plates) == [f"moulds/moulds-{i}.3mf" for i in (1, 2, 3)]

@@ -1,23 +1,21 @@
 """The time line: sums by hand, phases one after the other, cures that follow the room."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import pytest
 
-from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.procedure import procedure
 from unitcad.casting.steps import BenchStep, casting_summary, duration, phases
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load
 
 
-def casting(*source: str) -> Procedure:
+def casting(*source):
     moulds = MouldSet(load(source[0], list(source[1:])))
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
-def test_a_cure_ends_a_phase_and_a_rest_does_not() -> None:
+def test_a_cure_ends_a_phase_and_a_rest_does_not():
     steps = [
         BenchStep("a", "", kind="pour", minutes=3),
         BenchStep("b", "", kind="rest", minutes=1, wait_min=9),
@@ -30,7 +28,7 @@ def test_a_cure_ends_a_phase_and_a_rest_does_not() -> None:
     assert (last.name, last.start_min, last.end_min) == ("out", 75, 79)
 
 
-def test_the_earliest_finish_holds_both_cures_and_the_bench() -> None:
+def test_the_earliest_finish_holds_both_cures_and_the_bench():
     """Ecoflex 00-10 cures in 4 h, Dragon Skin 30 in 16 h, and each pour is struck again after 10 min."""
     made = casting("encapsulating")
     assert made.earliest_finish_min == pytest.approx(20 * 60 + 2 * 9 + made.bench_min)
@@ -42,14 +40,14 @@ def test_the_earliest_finish_holds_both_cures_and_the_bench() -> None:
         assert other.start_min == pytest.approx(one.end_min)
 
 
-def test_a_warmer_room_is_done_sooner() -> None:
+def test_a_warmer_room_is_done_sooner():
     """Ten kelvin more: half the cure, the same bench."""
     cold, warm = casting("encapsulating"), casting("encapsulating", "casting.room_c=33")
     assert warm.bench_min == cold.bench_min
     assert cold.earliest_finish_min - warm.earliest_finish_min == pytest.approx(600)
 
 
-def test_preparation_counts_the_bake_and_the_test_of_the_cure() -> None:
+def test_preparation_counts_the_bake_and_the_test_of_the_cure():
     """In resin 8 h in the oven, then the longest cure of the silicones, before the first pour begins."""
     made = casting("three-layer", "moulds.printer=sla")
     longest = max(pour.cure_h for pour in made.pours)
@@ -59,7 +57,7 @@ def test_preparation_counts_the_bake_and_the_test_of_the_cure() -> None:
     assert made.time_line[0].start_min == 0
 
 
-def test_a_gang_takes_longer_at_the_bench() -> None:
+def test_a_gang_takes_longer_at_the_bench():
     """Four cavities are wiped, greased, pulled and peeled one by one; a mix is weighed once."""
     one, four = casting("encapsulating"), casting("encapsulating", "moulds.cavities=[2,2]")
     minutes = {step.title: step.minutes for step in four.pours[1].steps}
@@ -71,7 +69,7 @@ def test_a_gang_takes_longer_at_the_bench() -> None:
     assert four.bench_min > 1.5 * one.bench_min
 
 
-def test_bubbles_rise_in_the_mould_before_it_is_struck_off() -> None:
+def test_bubbles_rise_in_the_mould_before_it_is_struck_off():
     """Ecoflex 00-30 without a vacuum rises in time; Ecoflex 00-10 does not, and is brushed on before it is poured."""
     for name, order in {
         "ecoflex-00-30": ["Mix", "Pour", "Let bubbles rise", "Strike off"],
@@ -97,11 +95,11 @@ def test_bubbles_rise_in_the_mould_before_it_is_struck_off() -> None:
         (60 * 1146 + 6, "47 days 18 h"),
     ],
 )
-def test_durations_in_words(minutes: float, text: str) -> None:
+def test_durations_in_words(minutes, text):
     assert duration(minutes) == text
 
 
-def test_the_summary_names_the_pours_whose_bubbles_stay() -> None:
+def test_the_summary_names_the_pours_whose_bubbles_stay():
     """Ecoflex 00-10 and Dragon Skin 30 as the verdicts of their pours have it; nothing is said with a vacuum."""
     made = casting("encapsulating", "casting.vacuum=false")
     *_, last = casting_summary(asdict(made))

@@ -1,26 +1,22 @@
 """What the tests of the checks share: judging bytes under a name, and cases with their options."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from malformed import options
-from shapes import Judge
 
-from unitcad.meshcheck import FileReport, check_file
+from unitcad.meshcheck import check_file
 
 
 @pytest.fixture
-def judge(tmp_path: Path) -> Judge:
+def judge(tmp_path):
     """judge(bytes or str, name, **options) writes a file and checks it."""
 
-    def run(content: bytes | str, name: str = "part.stl", **given: Any) -> FileReport:
+    def run(content, name="part.stl", **given):
         path = tmp_path / name
         path.write_bytes(content.encode() if isinstance(content, str) else content)
         return check_file(path, options(**given))

@@ -1,38 +1,31 @@
 """How two triangles meet, in fractions: an independent reference, slow and plain."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from fractions import Fraction
 from itertools import combinations
 
-import numpy as np
 
-Point = list[Fraction]
-
-
-def point(p: Sequence[float] | np.ndarray) -> Point:
+def point(p):
     return [Fraction(float(x)) for x in p]
 
 
-def minus(a: Point, b: Point) -> Point:
+def minus(a, b):
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
-def cross(a: Point, b: Point) -> Point:
+def cross(a, b):
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def dot(a: Point, b: Point) -> Fraction:
+def dot(a, b):
     return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
 
 
-def heights(triangle: Sequence[Point], over: Sequence[Point]) -> list[Fraction]:
+def heights(triangle, over):
     normal = cross(minus(over[1], over[0]), minus(over[2], over[0]))
     return [dot(normal, minus(p, over[0])) for p in triangle]
 
 
-def _cut(triangle: Sequence[Point], other: Sequence[Point]) -> tuple[list[Point], list[Fraction]]:
+def _cut(triangle, other):
     """Where a triangle's border meets the other's plane, and its corners' heights over it."""
     height = heights(triangle, other)
     points = [triangle[k] for k in range(3) if height[k] == 0]
@@ -44,7 +37,7 @@ def _cut(triangle: Sequence[Point], other: Sequence[Point]) -> tuple[list[Point]
     return points, height
 
 
-def reference(a: np.ndarray, b: np.ndarray) -> tuple[bool, bool] | None:
+def reference(a, b):
     """(crosses, touches) by intersecting both triangles with the line of their planes; None if coplanar."""
     one, other = [point(p) for p in a], [point(p) for p in b]
     points_a, height_a = _cut(one, other)
@@ -61,7 +54,7 @@ def reference(a: np.ndarray, b: np.ndarray) -> tuple[bool, bool] | None:
     return low < high and through, low <= high
 
 
-def common_part(a: Sequence[Point], b: Sequence[Point]) -> list[Point]:
+def common_part(a, b):
     """The corners of what two coplanar triangles, or a segment and a triangle b in its plane, have in common."""
     normal = cross(minus(b[1], b[0]), minus(b[2], b[0]))
     left = list(a)
@@ -79,20 +72,20 @@ def common_part(a: Sequence[Point], b: Sequence[Point]) -> list[Point]:
     return left
 
 
-def has_area(points: Sequence[Point]) -> bool:
+def has_area(points):
     return any(any(cross(minus(q, points[0]), minus(r, points[0]))) for q, r in combinations(points[1:], 2))
 
 
-def counts(vertices: np.ndarray, faces: np.ndarray) -> tuple[int, tuple[int, int], set[tuple[int, int]]]:
+def counts(vertices, faces):
     """Crossings (pairs of faces, and edges in a face whose faces leave to both sides), coplanar overlaps without and
     with those of pairs that share an edge, and pairs of faces that have a point in common."""
     corners = [[point(vertices[i]) for i in face] for face in faces]
     crossing = overlap = folded = 0
-    touching: set[tuple[int, int]] = set()
+    touching = set()
     for i, j in combinations(range(len(faces)), 2):
         shared = len(set(faces[i]) & set(faces[j]))
         answer = reference(vertices[faces[i]], vertices[faces[j]])
-        part: list[Point] = []
+        part = []
         if answer is None:
             part = common_part(corners[i], corners[j])
         if shared or part or (answer and answer[1]):
@@ -102,7 +95,7 @@ def counts(vertices: np.ndarray, faces: np.ndarray) -> tuple[int, tuple[int, int
         overlap += shared < 2 and covers
         folded += shared == 2 and covers
     for i in range(len(faces)):
-        sides: dict[tuple[int, int], set[bool]] = {}
+        sides = {}
         for j in range(len(faces)):
             if i == j or len(set(faces[i]) & set(faces[j])) > 1:
                 continue
@@ -117,7 +110,7 @@ def counts(vertices: np.ndarray, faces: np.ndarray) -> tuple[int, tuple[int, int
     return crossing, (overlap, overlap + folded), touching
 
 
-def _through(u: Point, v: Point, b: Sequence[Point]) -> bool:
+def _through(u, v, b):
     """Whether the segment passes through the inside of triangle b, in whose plane it lies."""
     part = common_part([u, v], b)
     if len(part) < 2 or all(p == part[0] for p in part):

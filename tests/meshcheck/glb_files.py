@@ -1,10 +1,7 @@
 """GLB files from a document and numbers."""
 
-from __future__ import annotations
-
 import json
 import struct
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +14,7 @@ TYPES = {
 }
 
 
-def packed(document: Any, binary: bytes = b"", *, version: int = 2) -> bytes:
+def packed(document, binary=b"", *, version=2):
     """The file of a document (or of JSON as bytes) and its binary chunk."""
     text = document if isinstance(document, bytes) else json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
@@ -28,12 +25,12 @@ def packed(document: Any, binary: bytes = b"", *, version: int = 2) -> bytes:
 
 
 def scene(
-    points: np.ndarray,
-    corners: np.ndarray | None,
-    nodes: list[dict[str, Any]] | None = None,
+    points,
+    corners,
+    nodes=None,
     *,
-    mode: int | None = None,
-) -> tuple[dict[str, Any], bytes]:
+    mode=None,
+):
     """The document and the numbers of one mesh in nodes that place it; positions as given, corners unsigned."""
     arrays = [np.ascontiguousarray(points), *([] if corners is None else [np.ascontiguousarray(corners).ravel()])]
     binary, views, accessors = b"", [], []
@@ -44,7 +41,7 @@ def scene(
             {"bufferView": len(views) - 1, "componentType": TYPES[array.dtype], "count": len(array), "type": kind}
         )
         binary += array.tobytes() + bytes(-array.nbytes % 4)
-    primitive: dict[str, Any] = {"attributes": {"POSITION": 0}}
+    primitive = {"attributes": {"POSITION": 0}}
     primitive |= {} if corners is None else {"indices": 1}
     primitive |= {} if mode is None else {"mode": mode}
     document = {

@@ -50,17 +50,17 @@ class Case:
     content: Content
     options: dict[str, Any] = field(default_factory=dict)
 
-    def data(self) -> bytes:
+    def data(self):
         return self.content.encode() if isinstance(self.content, str) else self.content
 
 
-def options(printer: str | None = None, **rest: Any) -> Options:
+def options(printer=None, **rest):
     """Options from plain values, as a malformed case names them; those of Limits stand among them."""
     bounds = {key: rest.pop(key) for key in Limits.__dataclass_fields__.keys() & rest}
     return Options(limits=Limits(**bounds), printer=printers()[printer] if printer else None, **rest)
 
 
-def cases() -> list[Case]:
+def cases():
     """All of them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # zipfile warns of the duplicate entry that is wanted
@@ -81,7 +81,7 @@ def cases() -> list[Case]:
     ]
 
 
-def _packages() -> list[tuple]:
+def _packages():
     override = TYPES.replace("</Types>", '<Override PartName="/3D/3dmodel.model" ContentType="text/plain"/></Types>')
     model_rels = "3D/_rels/3dmodel.model.rels"
     zeros = b"<!--" + b" " * 40_000_000 + b"-->"
@@ -125,7 +125,7 @@ def _packages() -> list[tuple]:
     ]  # fmt: skip
 
 
-def _models() -> list[tuple]:
+def _models():
     obj = f'<object id="1">{mesh_xml()}</object>'
     nested = obj + "".join(
         f'<object id="{i}"><components>{f"<component objectid={chr(34)}{i - 1}{chr(34)}/>" * 10}</components></object>'
@@ -140,7 +140,7 @@ def _models() -> list[tuple]:
         '<b:beamlattice minlength="0.1" radius="1"><b:beams><b:beam v1="0" v2="99"/></b:beams></b:beamlattice></mesh>'
     )
 
-    def item(transform: str) -> str:
+    def item(transform):
         return f'<build><item objectid="1" transform="{transform}"/></build>'
 
     return [
@@ -199,7 +199,7 @@ def _models() -> list[tuple]:
     ]  # fmt: skip
 
 
-def _values() -> list[tuple]:
+def _values():
     nan, inf = box(), box()
     nan[3, 1, 2], inf[0, 0, 0] = np.nan, np.inf
     return [
@@ -211,7 +211,7 @@ def _values() -> list[tuple]:
     ]
 
 
-def _topology() -> list[tuple]:
+def _topology():
     cube = box()
     fin = np.array([[[0, 0, 0], [0, 0, 10], [-5, -5, 5]]], float)
     flipped = cube.copy()
@@ -245,13 +245,13 @@ def _topology() -> list[tuple]:
     ]  # fmt: skip
 
 
-def _halves(triangle: np.ndarray) -> np.ndarray:
+def _halves(triangle):
     a, b, c = triangle
     middle = (a + b) / 2
     return np.array([[a, middle, c], [middle, b, c]])
 
 
-def with_sliver() -> np.ndarray:
+def with_sliver():
     """A box whose first face is split at a point that lies one float32 step off an edge."""
     cube = box(at=(3, 3, 3))
     a, b, c = cube[0]
@@ -260,7 +260,7 @@ def with_sliver() -> np.ndarray:
     return np.concatenate([cube[1:], [[a, point, c], [point, b, c], [a, b, point]]])
 
 
-def _geometry() -> list[tuple]:
+def _geometry():
     cube = box()
     pierced = np.concatenate([cube, box((5, 5, 20), (2.5, 2.5, -5))])
     crossed = (CUBE_CORNERS * 10).copy()
@@ -289,24 +289,24 @@ def _geometry() -> list[tuple]:
     ]
 
 
-def _wedge(width: float) -> np.ndarray:
+def _wedge(width):
     """A prism over a triangle with a corner at the origin; its faces look inwards."""
     return prism([(0, 0), (width, width), (width, -width)], 0, 5)
 
 
-def _items(shift: str) -> str:
+def _items(shift):
     """The cube, and once more with a shift."""
     return f'<build><item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 {shift}"/></build>'
 
 
-def _pair(shift: str) -> str:
+def _pair(shift):
     """The cube, and an object of two of it."""
     moved = f'<component objectid="1" transform="0 1 0 -1 0 0 0 0 1 {shift}"/>'
     both = f'<components><component objectid="1"/>{moved}</components>'
     return f'<object id="1">{mesh_xml()}</object><object id="2">{both}</object>'
 
 
-def _ringed(low: float, high: float, start: float) -> np.ndarray:
+def _ringed(low, high, start):
     """An upright tube from z = `start` through the cube's top at z = 10, with a ring of vertices in that plane."""
     ring = [(low, low), (high, low), (high, high), (low, high)]
     lower, upper = prism(ring, start, 10), prism(ring, 10, 20)
@@ -315,7 +315,7 @@ def _ringed(low: float, high: float, start: float) -> np.ndarray:
     return np.concatenate([lower[~cap], upper[~base]])
 
 
-def _tip(at: tuple[float, float, float]) -> np.ndarray:
+def _tip(at):
     """A tetrahedron that stands on its tip."""
     x, y, z = at
     tip = np.array([x, y, z])
@@ -323,7 +323,7 @@ def _tip(at: tuple[float, float, float]) -> np.ndarray:
     return np.array([[tip, b, a], [tip, c, b], [tip, a, c], [a, b, c]])
 
 
-def _printing() -> list[tuple]:
+def _printing():
     fdm = {"printer": "fdm-0.4"}
     plate = box((20, 20, 3))
     fence = box((20, 0.5, 10))
@@ -344,7 +344,7 @@ def _printing() -> list[tuple]:
     ]
 
 
-def _table() -> np.ndarray:
+def _table():
     """A mushroom: a wide slab on a narrow foot, one solid with no coplanar faces inside."""
     from manifold3d import Manifold
 

@@ -1,7 +1,5 @@
 """Files whose bytes or text are wrong before any geometry: the F rules, and what text formats promise of themselves."""
 
-from __future__ import annotations
-
 import gzip
 import zipfile
 
@@ -12,7 +10,7 @@ OBJ, PLY = obj(CUBE_CORNERS * 10, CUBE_FACES), text_ply(CUBE_CORNERS * 10, CUBE_
 OFF = polygon_files.off(CUBE_CORNERS * 10, CUBE_FACES.tolist()).decode()
 
 
-def files() -> list[tuple]:
+def files():
     """(name, code, content) each, options after it where there are any."""
     good, text = stl(box()), text_stl(box())
     return [
@@ -74,12 +72,12 @@ def files() -> list[tuple]:
     ]
 
 
-def _flipped(data: bytes) -> bytes:
+def _flipped(data):
     at = data.index(b'x="10"')
     return data[:at] + b'x="90"' + data[at + 6 :]
 
 
-def text_meshes() -> list[tuple]:
+def text_meshes():
     """OBJ, PLY and OFF whose lines are not what they promise."""
     return [
         ("cut.off", "F002", OFF[: OFF.rindex("3 ", 0, -20)]),
@@ -108,7 +106,7 @@ def text_meshes() -> list[tuple]:
     ]
 
 
-def good_text_meshes() -> list[tuple[str, str]]:
+def good_text_meshes():
     """(name, content) of the same cube without a fault."""
     slashes = polygon_files.obj(CUBE_CORNERS * 10, CUBE_FACES.tolist(), form="{}//").decode()
     good = [("cube.off", OFF), ("cube.ply", PLY), ("cube.obj", OBJ), ("tabs.obj", OBJ.replace(" ", "\t"))]

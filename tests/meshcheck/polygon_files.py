@@ -1,28 +1,22 @@
 """The same polygons written as PLY, OBJ and OFF in the ways that their formats allow."""
 
-from __future__ import annotations
-
 import struct
-from collections.abc import Sequence
 
-import numpy as np
-
-Faces = Sequence[Sequence[int]]
 PLY_TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I"}
 PLY_TYPES |= {"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"}
 PLY_TYPES |= {"float": "f", "double": "d", "float32": "f", "float64": "d"}
 
 
 def ply(
-    points: np.ndarray,
-    faces: Faces,
-    order: str = "<",
+    points,
+    faces,
+    order="<",
     *,
-    coordinate: str = "double",
-    count: str = "uchar",
-    index: str = "int",
-    extra: bool = False,
-) -> bytes:
+    coordinate="double",
+    count="uchar",
+    index="int",
+    extra=False,
+):
     """A PLY; `order` is < or > for binary, "" for text. `extra` adds properties, lists and an element."""
     name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
     head = ["ply", f"format {name} 1.0", "comment made for a test", f"element vertex {len(points)}"]
@@ -35,9 +29,9 @@ def ply(
         "end_header",
         "",
     ]
-    records: list[list[tuple[str, float]]] = []
+    records = []
     for i, point in enumerate(points):
-        row: list[tuple[str, float]] = [("B", 200)] if extra else []
+        row = [("B", 200)] if extra else []
         row += [(PLY_TYPES[coordinate], float(value)) for value in point]
         records.append(row + ([("B", i % 3), *[("h", -i % 99)] * (i % 3)] if extra else []))
     records += [[("f", 0.5)], [("f", 1.0)]] * extra
@@ -54,7 +48,7 @@ def ply(
     return "\n".join(head).encode() + body
 
 
-def obj(points: np.ndarray, faces: Faces, *, negative: bool = False, form: str = "{}", wrapped: bool = False) -> bytes:
+def obj(points, faces, *, negative=False, form="{}", wrapped=False):
     """An OBJ; `form` writes an index, `wrapped` continues each face on further lines."""
     rows = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in points]
     space = " \\\n  " if wrapped else " "
@@ -65,7 +59,7 @@ def obj(points: np.ndarray, faces: Faces, *, negative: bool = False, form: str =
     return "\n".join([*lines, ""]).encode()
 
 
-def off(points: np.ndarray, faces: Faces, *, kind: str = "", colors: bool = False, comments: bool = False) -> bytes:
+def off(points, faces, *, kind="", colors=False, comments=False):
     """An OFF of a kind such as CN; `colors` follow the faces."""
     more = " 0.1 0.2 0.3" * ("N" in kind) + " 255 0 0 255" * ("C" in kind) + " 0.5 0.5" * ("ST" in kind)
     note = "  # a note: 3 0 1 2" if comments else ""
@@ -75,7 +69,7 @@ def off(points: np.ndarray, faces: Faces, *, kind: str = "", colors: bool = Fals
     return "\n".join([*head, *rows, ""]).encode()
 
 
-def every_way(points: np.ndarray, faces: Faces) -> dict[str, bytes]:
+def every_way(points, faces):
     """Files of the polygons by a name with the format's suffix."""
     made = {}
     for order, said in (("<", "little"), (">", "big"), ("", "text")):

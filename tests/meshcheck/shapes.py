@@ -1,17 +1,10 @@
 """Meshes and files for the tests of the checks: small solids, binary and text STL, 3MF packages."""
 
-from __future__ import annotations
-
 import io
 import struct
 import zipfile
-from collections.abc import Callable, Sequence
 
 import numpy as np
-
-from unitcad.meshcheck import FileReport, Finding
-
-Judge = Callable[..., FileReport]
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
@@ -32,12 +25,12 @@ CUBE_FACES = np.array(
 )  # fmt: skip
 
 
-def box(size: Sequence[float] = (10, 10, 10), at: Sequence[float] = (0, 0, 0)) -> np.ndarray:
+def box(size=(10, 10, 10), at=(0, 0, 0)):
     """The triangles of a box, (12, 3, 3), outwards."""
     return (CUBE_CORNERS * np.asarray(size, float) + np.asarray(at, float))[CUBE_FACES]
 
 
-def prism(outline: Sequence[tuple[float, float]], low: float, high: float) -> np.ndarray:
+def prism(outline, low, high):
     """The triangles of an upright prism over a convex outline that turns anticlockwise."""
     n = len(outline)
     bottom = np.array([[x, y, low] for x, y in outline])
@@ -50,9 +43,7 @@ def prism(outline: Sequence[tuple[float, float]], low: float, high: float) -> np
     return np.array(found)
 
 
-def stl(
-    triangles: np.ndarray, *, header: bytes = b"a box", count: int | None = None, normals: np.ndarray | None = None
-) -> bytes:
+def stl(triangles, *, header=b"a box", count=None, normals=None):
     """A binary STL; `normals` are zeros unless given."""
     records = np.zeros(len(triangles), np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]))
     records["v"] = triangles
@@ -63,7 +54,7 @@ def stl(
     )
 
 
-def text_stl(triangles: np.ndarray, name: str = "box") -> str:
+def text_stl(triangles, name="box"):
     """A text STL with zero normals."""
     lines = [f"solid {name}"]
     for corners in triangles:
@@ -73,7 +64,7 @@ def text_stl(triangles: np.ndarray, name: str = "box") -> str:
     return "\n".join([*lines, f"endsolid {name}", ""])
 
 
-def text_ply(corners: np.ndarray, faces: np.ndarray) -> str:
+def text_ply(corners, faces):
     """A text PLY of triangles."""
     head = ["ply", "format ascii 1.0", f"element vertex {len(corners)}", *(f"property double {axis}" for axis in "xyz")]
     head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
@@ -81,7 +72,7 @@ def text_ply(corners: np.ndarray, faces: np.ndarray) -> str:
     return "\n".join([*head, *rows, ""])
 
 
-def obj(corners: np.ndarray, faces: np.ndarray) -> str:
+def obj(corners, faces):
     """A text OBJ of triangles."""
     rows = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in corners]
     return "\n".join([*rows, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces), ""])
@@ -90,7 +81,7 @@ def obj(corners: np.ndarray, faces: np.ndarray) -> str:
 FORMATS = ("binary.stl", "text.stl", "part.ply", "part.obj", "part.3mf")
 
 
-def in_format(triangles: np.ndarray, name: str) -> bytes | str:
+def in_format(triangles, name):
     """Triangles (n, 3, 3) as a file of one of FORMATS; indexed formats list each place once."""
     if name == "binary.stl":
         return stl(triangles)
@@ -103,9 +94,7 @@ def in_format(triangles: np.ndarray, name: str) -> bytes | str:
     return (text_ply if name == "part.ply" else obj)(corners, faces)
 
 
-def turned(
-    triangles: np.ndarray, seed: int, scale: float = 1.0, shift: float = 0.0, mirror: bool = False
-) -> np.ndarray:
+def turned(triangles, seed, scale=1.0, shift=0.0, mirror=False):
     """The same body turned by odd angles, scaled, shifted by up to `shift` mm, mirrored; faces still look outwards."""
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -114,7 +103,7 @@ def turned(
     return found[:, ::-1] if mirror else found
 
 
-def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:
+def fin(*, other_diagonals, cells=1):
     """Two coincident sheets from the origin's upright edge outwards, 5 sqrt(2) by 10; `cells` quads each way."""
     found = []
     steps = np.linspace(0, 1, cells + 1)
@@ -129,7 +118,7 @@ def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:
     return np.array(found)
 
 
-def surface(field: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def surface(field, rng):
     """The faces between cells of different winding number, as many as the numbers differ, with either diagonal."""
     padded, found = np.pad(field, 1), []
     for axis in range(3):
@@ -146,7 +135,7 @@ def surface(field: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.array(found)
 
 
-def mesh_xml(corners: np.ndarray = CUBE_CORNERS * 10, faces: np.ndarray = CUBE_FACES, per_face: str = "") -> str:
+def mesh_xml(corners=CUBE_CORNERS * 10, faces=CUBE_FACES, per_face=""):
     """A <mesh> element."""
     points = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in corners)
     rows = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}" {per_face}/>' for a, b, c in faces)
@@ -154,11 +143,11 @@ def mesh_xml(corners: np.ndarray = CUBE_CORNERS * 10, faces: np.ndarray = CUBE_F
 
 
 def model_xml(
-    resources: str | None = None,
-    build: str | None = '<build><item objectid="1"/></build>',
-    attributes: str = 'unit="millimeter"',
-    before: str = "",
-) -> str:
+    resources=None,
+    build='<build><item objectid="1"/></build>',
+    attributes='unit="millimeter"',
+    before="",
+):
     """A model part: a cube unless `resources` says otherwise."""
     if resources is None:
         resources = f'<object id="1">{mesh_xml()}</object>'
@@ -169,7 +158,7 @@ def model_xml(
     )
 
 
-def rels_xml(*relations: tuple[str, str], mode: str = "") -> str:
+def rels_xml(*relations, mode=""):
     """A relationships part: (type, target) each."""
     rows = "".join(
         f'<Relationship Id="r{i}" Type="{kind}" Target="{target}"{mode}/>' for i, (kind, target) in enumerate(relations)
@@ -188,17 +177,17 @@ ROOT_RELS = rels_xml((START, "/3D/3dmodel.model"))
 
 
 def package(
-    model: str | bytes | None = None,
+    model=None,
     *,
-    types: str | None = TYPES,
-    rels: str | None = ROOT_RELS,
-    more: Sequence[tuple[str, str | bytes]] = (),
-    at: str = "3D/3dmodel.model",
-    compression: int = zipfile.ZIP_DEFLATED,
-) -> bytes:
+    types=TYPES,
+    rels=ROOT_RELS,
+    more=(),
+    at="3D/3dmodel.model",
+    compression=zipfile.ZIP_DEFLATED,
+):
     """A 3MF package; `more` are further entries, written even if a name is there already."""
     out = io.BytesIO()
-    entries: list[tuple[str, str | bytes]] = []
+    entries = []
     if types is not None:
         entries.append(("[Content_Types].xml", types))
     if rels is not None:
@@ -210,6 +199,6 @@ def package(
     return out.getvalue()
 
 
-def finding(report: FileReport, code: str) -> Finding:
+def finding(report, code):
     """The finding of a code; a report has one at most."""
     return next(found for found in report.findings if found.code == code)

@@ -1,9 +1,5 @@
 """Uniform blocks of vertices and triangles: the same model, line by line, as the parser alone gives."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -80,7 +76,7 @@ CUT = [f'<q a="{50 * "."}/>{{}}"></q>', *(f"{begin}{48 * '.'}/><vertices>{{}}</v
 """What a block of 60 bytes ends within."""
 
 
-def _texts(of: list[str]) -> st.SearchStrategy[str]:
+def _texts(of):
     """Draw runs of one text or two, as programs write them, some of them inside of something, and what is odd."""
     one = st.one_of(st.sampled_from(of[:3]), st.sampled_from(of))
     some = st.lists(one, min_size=1, max_size=2).flatmap(lambda texts: st.lists(st.sampled_from(texts), max_size=8))
@@ -89,7 +85,7 @@ def _texts(of: list[str]) -> st.SearchStrategy[str]:
     return st.lists(st.one_of(run, run, run, wrapped, st.sampled_from(ODD)), max_size=4).map("".join)
 
 
-def _model(vertices: str, triangles: str = "", prefix: str = "", opened: str = "<{}vertices>") -> bytes:
+def _model(vertices, triangles="", prefix="", opened="<{}vertices>"):
     name = f"xmlns:{prefix[:-1]}" if prefix else "xmlns"
     body = f"{opened.format(prefix)}{vertices}</{prefix}vertices>\n<{prefix}triangles>{triangles}</{prefix}triangles>"
     return (
@@ -100,13 +96,13 @@ def _model(vertices: str, triangles: str = "", prefix: str = "", opened: str = "
 
 
 @st.composite
-def _models(draw: st.DrawFn) -> bytes:
+def _models(draw):
     prefix = draw(st.sampled_from(["", "", "", "c:"]))
     opened = draw(st.sampled_from(["<{}vertices>", "<{}vertices>", "<{}vertices >", '<{}vertices a="1">']))
     return _model(draw(_texts(VERTICES)), draw(_texts(TRIANGLES)), prefix, opened)
 
 
-def _read(text: bytes, chunk: int) -> Any:
+def _read(text, chunk):
     """Return all that is read of a model part, or the findings that end it, in plain data."""
     chunks = [text[i : i + chunk] for i in range(0, len(text), chunk)]
     try:
@@ -118,7 +114,7 @@ def _read(text: bytes, chunk: int) -> Any:
     return found, [(mesh.vertices.tolist(), mesh.rows.tolist()) for mesh in meshes], sorted(model.resources)
 
 
-def _confirm_equal(text: bytes, chunk: int, block: int) -> None:
+def _confirm_equal(text, chunk, block):
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(threemf_model, "_BLOCK", block)
         patched.setattr(threemf_model, "_SHORTEST", 1)
@@ -129,12 +125,12 @@ def _confirm_equal(text: bytes, chunk: int, block: int) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(_models(), st.sampled_from([7, 60, 10_000]), st.sampled_from([60, 200, 10_000]))
-def test_reading_at_once_changes_nothing(text: bytes, chunk: int, block: int) -> None:
+def test_reading_at_once_changes_nothing(text, chunk, block):
     _confirm_equal(text, chunk, block)
 
 
 @pytest.mark.parametrize("element", [*VERTICES, *TRIANGLES])
-def test_reading_elements_of_one_text_at_once_changes_nothing(element: str) -> None:
+def test_reading_elements_of_one_text_at_once_changes_nothing(element):
     for behind in ("", element.replace("1", "3"), VERTICES[0]):
         text = 5 * element + behind
         _confirm_equal(_model(text) if "vertex" in element else _model(2 * VERTICES[0], text), 10_000, 10_000)
@@ -142,25 +138,25 @@ def test_reading_elements_of_one_text_at_once_changes_nothing(element: str) -> N
 
 @pytest.mark.parametrize("around", [*WRAPPED, *CUT])
 @pytest.mark.parametrize("block", [60, 10_000])
-def test_what_only_looks_like_elements_is_left_to_the_parser(around: str, block: int) -> None:
+def test_what_only_looks_like_elements_is_left_to_the_parser(around, block):
     _confirm_equal(_model(around.format(6 * VERTICES[0]) + VERTICES[0]), 10_000, block)
     _confirm_equal(_model(2 * VERTICES[0], around.format(6 * TRIANGLES[0]) + TRIANGLES[0]), 10_000, block)
 
 
 @pytest.mark.parametrize("blank", ["\x0b", "\x0c", "\xa0"])
-def test_a_blank_that_xml_forbids_is_refused(blank: str) -> None:
+def test_a_blank_that_xml_forbids_is_refused(blank):
     for vertex in (VERTICES[0].replace(" ", blank), VERTICES[0].replace("/>", f"{blank}/>"), VERTICES[0] + blank):
         text = _model(100 * vertex)
         assert isinstance(_read(text, 10_000), str) or blank == "\xa0"
         _confirm_equal(text, 10_000, 10_000)
 
 
-def _parsed(text: bytes) -> tuple[list[bytes], threemf_model.Model]:
+def _parsed(text):
     """Return the pieces that the parser is given, and the model."""
     model = threemf_model.Model("a")
     reader, pieces = threemf_model._Reader(model, Limits(), 0), []
 
-    def watched() -> Any:
+    def watched():
         for piece in threemf_model.rest_for_parser([text], reader):
             pieces.append(bytes(piece))
             yield piece
@@ -169,7 +165,7 @@ def _parsed(text: bytes) -> tuple[list[bytes], threemf_model.Model]:
     return pieces, model
 
 
-def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece() -> None:
+def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece():
     """The parser looks through an unfinished comment again with every piece."""
     text = _model(f"<!--{20_000 * '<vertices>'}-->")
     pieces, _ = _parsed(text)
@@ -178,7 +174,7 @@ def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece() -> None:
 
 
 @pytest.mark.parametrize("line_end", ["", "\n", "\r\n"])
-def test_most_of_a_part_is_read_at_once(line_end: str) -> None:
+def test_most_of_a_part_is_read_at_once(line_end):
     vertices = "".join(f'  <vertex x="{i}.5" y="-{i}" z="1e-{i % 9}"/>{line_end}' for i in range(5000))
     triangles = "".join(f'<triangle v1="{i}" v2="{i + 1}" v3="{i + 2}" />{line_end}' for i in range(4998))
     text = _model(line_end + vertices, triangles)

@@ -1,13 +1,11 @@
 """3MF as programs write it: exports of theirs, and what BambuStudio and Cura put into a package."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from shapes import PNG, PRODUCTION, START, THUMBNAIL, Judge, box, mesh_xml, model_xml, package, rels_xml, text_stl
+from shapes import PNG, PRODUCTION, START, THUMBNAIL, box, mesh_xml, model_xml, package, rels_xml, text_stl
 
 from unitcad.meshcheck import Options, check_file
 
@@ -19,7 +17,7 @@ PAINTED, COLORED = 'paint_color="4"', 'pid="2" p1="0"'
 
 
 @pytest.mark.parametrize("path", sorted(PROGRAMS.glob("*.3mf")), ids=lambda path: path.stem)
-def test_an_export_passes(path: Path) -> None:
+def test_an_export_passes(path):
     report = check_file(path)
     assert report.verdict in ("pass", "warning"), report.findings
     assert {found.code for found in report.findings} <= {"P002", "P017"}
@@ -29,7 +27,7 @@ def test_an_export_passes(path: Path) -> None:
 @pytest.mark.smoke
 @pytest.mark.slicer
 @pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="PrusaSlicer is not installed")
-def test_what_prusaslicer_exports_now_passes(tmp_path: Path) -> None:
+def test_what_prusaslicer_exports_now_passes(tmp_path):
     (tmp_path / "a.stl").write_text(text_stl(box()))
     (tmp_path / "b.stl").write_text(text_stl(box((20, 5, 5))))
     command = ["prusa-slicer", "--export-3mf", "--merge", "a.stl", "b.stl", "-o", "c.3mf"]
@@ -55,13 +53,13 @@ LENIENT = {
 
 
 @pytest.mark.parametrize("name", LENIENT)
-def test_what_common_programs_write_is_an_error_only_where_strictness_is_asked_for(name: str, judge: Judge) -> None:
+def test_what_common_programs_write_is_an_error_only_where_strictness_is_asked_for(name, judge):
     for strict, severity in ((False, "warning"), (True, "error")):
         report = judge(LENIENT[name], "a.3mf", strict_3mf=strict)
         assert [(found.code, found.severity) for found in report.findings] == [(name[:4], severity)]
 
 
-def test_a_project_as_bambustudio_packs_it_passes(judge: Judge) -> None:
+def test_a_project_as_bambustudio_packs_it_passes(judge):
     """Objects in parts of their own, attributes without prefix, several covers of types that are no thumbnail's."""
     child = model_xml(f'<object id="1" p:UUID="{UUID}" type="model">{mesh_xml()}</object>', "<build/>",
                       'unit="millimeter" requiredextensions="p"')  # fmt: skip
@@ -89,7 +87,7 @@ def test_a_project_as_bambustudio_packs_it_passes(judge: Judge) -> None:
     assert report.facts.volume_mm3 == pytest.approx(1000)
 
 
-def test_a_project_as_cura_packs_it_passes(judge: Judge) -> None:
+def test_a_project_as_cura_packs_it_passes(judge):
     settings = '<metadata name="cura:print_order" preserve="true" type="xs:integer">1</metadata>'
     model = model_xml(
         f'<object id="1" name="a.stl" type="model"><metadatagroup>{settings}</metadatagroup>{mesh_xml()}</object>',
@@ -100,7 +98,7 @@ def test_a_project_as_cura_packs_it_passes(judge: Judge) -> None:
     assert report.findings == ()
 
 
-def test_findings_name_part_object_and_line(judge: Judge) -> None:
+def test_findings_name_part_object_and_line(judge):
     lines = model_xml(f'<object id="7">{mesh_xml()}</object>', '\n<build>\n<item objectid="7" odd="1"/></build>')
     model = lines.replace("<vertex ", "\n<vertex ").replace("<triangle ", "\n<triangle ")
     first = model[: model.index("<triangle ")].count("\n") + 1
@@ -122,7 +120,7 @@ def test_findings_name_part_object_and_line(judge: Judge) -> None:
 
 @pytest.mark.parametrize("text", ["hello", "<![CDATA[<vertex x='1' y='2' z='3'/>]]>", "&#160;"])
 @pytest.mark.parametrize("behind", ["<vertices>", "<mesh>", '<object id="1">', "<build>"])
-def test_text_between_elements_is_a_finding(text: str, behind: str, judge: Judge) -> None:
+def test_text_between_elements_is_a_finding(text, behind, judge):
     model = model_xml(f'<object id="1">{mesh_xml()}</object>')
     wrong = model.replace(behind, behind + text, 1)
     assert wrong != model
@@ -133,7 +131,7 @@ def test_text_between_elements_is_a_finding(text: str, behind: str, judge: Judge
 
 
 @pytest.mark.parametrize("blank", ["\u00a0", "\u2003", "\u0085", "\u3000"])
-def test_blanks_that_xml_does_not_know_are_no_part_of_a_number(blank: str, judge: Judge) -> None:
+def test_blanks_that_xml_does_not_know_are_no_part_of_a_number(blank, judge):
     model = model_xml(f'<object id="1">{mesh_xml()}</object>')
     report = judge(package(model.replace('x="0', f'x="{blank}0', 1)), "a.3mf")
     assert [found.code for found in report.findings if found.severity == "error"] == ["F004"]

@@ -1,7 +1,5 @@
 """Every pair of faces of small meshes against fractions: degenerate ones above all, that fill the exact stages."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from exact_pairs import counts
@@ -17,7 +15,7 @@ KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared 
          "two heights", "boxes", "turned boxes", "block of boxes", "block of boxes and sheets", "far away"]  # fmt: skip
 
 
-def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
+def _soup(kind, rng):
     """Triangles (n, 3, 3)."""
     n = int(rng.integers(6, 15))
     lattice = rng.integers(-2, 3, (n, 3, 3)).astype(float)
@@ -53,7 +51,7 @@ def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
     return rng.normal(size=(n, 3, 3))
 
 
-def _compare(kind: str, seed: int) -> tuple[int, int, int]:
+def _compare(kind, seed):
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     soup = _soup(kind, rng)
     if seed % 2:
@@ -73,7 +71,7 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
     return crossing, len(crossings.join_pairs(found.covering)), len(shells)
 
 
-def _agree(found: crossings.Crossings, kind: str, crossing: int, overlaps: tuple[int, int]) -> None:
+def _agree(found, kind, crossing, overlaps):
     assert len(crossings.join_pairs(found.crossing)) == crossing
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
     covers = len(crossings.join_pairs(found.covering))
@@ -81,7 +79,7 @@ def _agree(found: crossings.Crossings, kind: str, crossing: int, overlaps: tuple
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_pair_is_what_fractions_say(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_pair_is_what_fractions_say(kind, monkeypatch):
     """As it runs, and with pairs decided in many small blocks."""
     sums = np.zeros(3, int)
     for seed in range(8):
@@ -95,11 +93,11 @@ def test_every_pair_is_what_fractions_say(kind: str, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_pair_of_thousands_of_meshes(kind: str) -> None:
+def test_every_pair_of_thousands_of_meshes(kind):
     for seed in range(100, 500):
         _compare(kind, seed)
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("about a vertex", 100), ("two heights", 104), ("one tilted plane", 397)])
-def test_shells_that_share_no_more_than_an_edge_touch(kind: str, seed: int) -> None:
+def test_shells_that_share_no_more_than_an_edge_touch(kind, seed):
     _compare(kind, seed)

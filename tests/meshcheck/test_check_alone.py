@@ -1,7 +1,5 @@
 """The mesh check works without the rest of the package: copied with the few modules that it uses."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess
@@ -36,7 +34,7 @@ print(json.dumps([[[item.code for item in report.findings] for report in reports
 """
 
 
-def test_check_needs_only_the_modules_below_it(tmp_path: Path) -> None:
+def test_check_needs_only_the_modules_below_it(tmp_path):
     whole, alone = Path(unitcad.__file__).parent, tmp_path / "unitcad"
     alone.mkdir()
     for name in PARTS:

@@ -1,10 +1,6 @@
 """A baseline: known findings are listed and do not fail, new ones do; the order of vertices does not matter."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
-from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -22,20 +18,20 @@ CASES = {"hole": box()[2:], "crossed": CROSSED, "touching": TOUCHING, "inverted"
 KNOWN = ["--baseline", "known.json"]
 
 
-def shuffled(triangles: np.ndarray, seed: int) -> np.ndarray:
+def shuffled(triangles, seed):
     """The same surface as another program may write it: faces in another order, each from another corner."""
     rng = np.random.default_rng(seed)
     turned = np.array([np.roll(face, rng.integers(3), axis=0) for face in triangles])
     return turned[rng.permutation(len(turned))]
 
 
-def verdicts(result: CompletedProcess) -> dict[str, bool]:
+def verdicts(result):
     (entry,) = json.loads(result.stdout)["files"]
     return {found["code"]: found["known"] for found in entry["findings"]}
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_new_export_of_the_same_part_holds_nothing_new(tmp_path: Path, name: str) -> None:
+def test_a_new_export_of_the_same_part_holds_nothing_new(tmp_path, name):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(CASES[name]))
     printed = ["--printer", "fdm-0.4", "--fail-on", "warning"]
@@ -61,7 +57,7 @@ def test_a_new_export_of_the_same_part_holds_nothing_new(tmp_path: Path, name: s
      (np.concatenate([box()[2:], box((4, 4, 4), (8, 3, 3))]), "G001"), (box((10, 10, 10))[:10], "T001")],
     ids=["larger hole", "second hole", "another fault", "hole elsewhere"],
 )  # fmt: skip
-def test_what_is_new_fails(tmp_path: Path, worse: np.ndarray, code: str) -> None:
+def test_what_is_new_fails(tmp_path, worse, code):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(box()[2:]))
     run("a.stl", *KNOWN, "--write-baseline", cwd=tmp_path)
@@ -72,7 +68,7 @@ def test_what_is_new_fails(tmp_path: Path, worse: np.ndarray, code: str) -> None
     assert verdicts(result)[code] is False
 
 
-def test_new_places_come_first_and_the_message_counts(tmp_path: Path) -> None:
+def test_new_places_come_first_and_the_message_counts(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(np.concatenate([box((30, 30, 30))[2:], box()])))
     run("a.stl", *KNOWN, "--write-baseline", cwd=tmp_path)
@@ -83,7 +79,7 @@ def test_new_places_come_first_and_the_message_counts(tmp_path: Path) -> None:
     assert [place["xyz"][0] >= 50 for place in found["locations"]] == [True] * 4 + [False]
 
 
-def test_known_findings_in_every_format(tmp_path: Path) -> None:
+def test_known_findings_in_every_format(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     run("a.stl", *KNOWN, "--write-baseline", cwd=tmp_path)
     text = run("a.stl", *KNOWN, cwd=tmp_path).stdout
@@ -100,7 +96,7 @@ def test_known_findings_in_every_format(tmp_path: Path) -> None:
     assert "T001 error (known)" in junit
 
 
-def test_what_ended_the_judgement_or_breaks_a_manifest_is_never_known(tmp_path: Path) -> None:
+def test_what_ended_the_judgement_or_breaks_a_manifest_is_never_known(tmp_path):
     (tmp_path / "cut.stl").write_bytes(stl(box())[:-80])
     assert run("cut.stl", *KNOWN, "--write-baseline", cwd=tmp_path).returncode == 1
     assert run("cut.stl", *KNOWN, cwd=tmp_path).returncode == 1
@@ -110,7 +106,7 @@ def test_what_ended_the_judgement_or_breaks_a_manifest_is_never_known(tmp_path: 
     assert run("--manifest", ".", *KNOWN, "--write-baseline", cwd=tmp_path).returncode == 1
 
 
-def test_files_are_found_from_the_baselines_folder_and_others_stay(tmp_path: Path) -> None:
+def test_files_are_found_from_the_baselines_folder_and_others_stay(tmp_path):
     (tmp_path / "sub").mkdir()
     for name in ("a.stl", "sub/b.stl", "sub/gone.stl"):
         (tmp_path / name).write_bytes(stl(box()[2:]))
@@ -122,7 +118,7 @@ def test_files_are_found_from_the_baselines_folder_and_others_stay(tmp_path: Pat
     assert list(json.loads((tmp_path / "known.json").read_text())["files"]) == ["sub/b.stl"]
 
 
-def test_the_baseline_of_the_settings(tmp_path: Path) -> None:
+def test_the_baseline_of_the_settings(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "a.stl").write_bytes(stl(box()[2:]))
     (tmp_path / "unitcad.toml").write_text('[check]\nbaseline = "known.json"\n')
@@ -140,7 +136,7 @@ def test_the_baseline_of_the_settings(tmp_path: Path) -> None:
      b'{"unitcad-baseline": 1, "files": {"a": [{"code": "T001", "severity": "error", "count": 1, "places": [[1]]}]}}'],
 )  # fmt: skip
 @pytest.mark.parametrize("more", [[], ["--write-baseline"]])
-def test_what_is_no_baseline_is_one_error_and_stays(tmp_path: Path, content: bytes, more: list[str]) -> None:
+def test_what_is_no_baseline_is_one_error_and_stays(tmp_path, content, more):
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     (tmp_path / "known.json").write_bytes(content)
     result = run("a.stl", *KNOWN, *more, cwd=tmp_path)
@@ -150,11 +146,11 @@ def test_what_is_no_baseline_is_one_error_and_stays(tmp_path: Path, content: byt
     assert not any(word in result.stderr for word in ("Expected", "Object", "malformed", "$", "`int`"))
 
 
-def test_all_locations_are_listed_on_request(tmp_path: Path) -> None:
+def test_all_locations_are_listed_on_request(tmp_path):
     many = np.concatenate([box(at=(20 * i, 0, 0))[2:] for i in range(40)])
     (tmp_path / "a.stl").write_bytes(stl(many))
 
-    def places(*more: str) -> list[dict]:
+    def places(*more):
         (entry,) = json.loads(run("a.stl", "--json", "--select", "T001", *more, cwd=tmp_path).stdout)["files"]
         (found,) = entry["findings"]
         assert found["count"] == 160
@@ -170,7 +166,7 @@ def test_all_locations_are_listed_on_request(tmp_path: Path) -> None:
     assert len(entry["places"]) == 160
 
 
-def test_an_unfinished_check_keeps_what_was_known(tmp_path: Path) -> None:
+def test_an_unfinished_check_keeps_what_was_known(tmp_path):
     (tmp_path / "part.stl").write_bytes(stl(CROSSED))
     write = ("part.stl", *KNOWN, "--write-baseline")
     run(*write, cwd=tmp_path)

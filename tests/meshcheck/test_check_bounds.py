@@ -1,14 +1,11 @@
 """Piles of faces and shells: what would take all time or memory is bounded, and found is what was found by then."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from shapes import Judge, box, finding, stl
+from shapes import box, finding, stl
 
 from unitcad.geometry import boxes
 from unitcad.geometry.boxes import TooMany
@@ -17,7 +14,7 @@ from unitcad.meshcheck.geometry import crossings, sieves
 Points = np.ndarray
 
 
-def cone(n: int, height: float = 30, cap: bool = True) -> Points:
+def cone(n, height=30, cap=True):
     """A cone of n facets of radius 20; its base is a fan round its middle, or round a point of its rim."""
     turn = np.linspace(0, 2 * np.pi, n, endpoint=False)
     rim = np.stack([20 * np.cos(turn), 20 * np.sin(turn), 0 * turn], axis=1)
@@ -29,9 +26,7 @@ def cone(n: int, height: float = 30, cap: bool = True) -> Points:
 
 @pytest.mark.parametrize("cap", [True, False])
 @pytest.mark.parametrize("through", [None, 0.3])
-def test_faces_round_a_hub_are_judged_as_others_are(
-    cap: bool, through: float | None, monkeypatch: pytest.MonkeyPatch, judge: Judge
-) -> None:
+def test_faces_round_a_hub_are_judged_as_others_are(cap, through, monkeypatch, judge):
     """With and without hubs the findings are the same: of a cone, and of one that a box pierces near its rim."""
     body = cone(3000, cap=cap)
     if through is not None:
@@ -44,7 +39,7 @@ def test_faces_round_a_hub_are_judged_as_others_are(
     assert [code for code, _, _ in found[0]] == ([] if through is None else ["G001", "G002"])
 
 
-def test_a_cone_of_many_facets_is_looked_at_in_few_pairs(monkeypatch: pytest.MonkeyPatch, judge: Judge) -> None:
+def test_a_cone_of_many_facets_is_looked_at_in_few_pairs(monkeypatch, judge):
     """Each facet has 40,000 others at its tip, and few at its base."""
     looked = []
     real = crossings._sieved
@@ -55,7 +50,7 @@ def test_a_cone_of_many_facets_is_looked_at_in_few_pairs(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("n", [40, 300])
-def test_nested_cubes_are_solid_and_hollow_in_turn(n: int, judge: Judge) -> None:
+def test_nested_cubes_are_solid_and_hollow_in_turn(n, judge):
     """Every other one faces inwards: all are sound, and none overlaps."""
     cubes = [(box() - 5) * (1 + i / 20) for i in range(n)]
     sound = np.concatenate([cube if (n - i) % 2 else cube[:, ::-1] for i, cube in enumerate(cubes)])
@@ -65,7 +60,7 @@ def test_nested_cubes_are_solid_and_hollow_in_turn(n: int, judge: Judge) -> None
     assert {found.code: found.count for found in all_out.findings} == {"G002": n // 2}
 
 
-def test_one_face_many_times_is_a_face_and_its_duplicates(judge: Judge) -> None:
+def test_one_face_many_times_is_a_face_and_its_duplicates(judge):
     n = 2000
     report = judge(stl(np.repeat(np.array([[[0, 0, 0], [10, 0, 0], [0, 10, 0]]], float), n, axis=0)))
     found = {finding.code: finding for finding in report.findings}
@@ -78,9 +73,7 @@ def test_one_face_many_times_is_a_face_and_its_duplicates(judge: Judge) -> None:
     ("module", "bound", "name"),
     [(crossings, "_MOST_LOOKS", "faces"), (boxes, "MOST_PAIRS", "boxes")],
 )
-def test_too_many_pairs_end_a_check_which_says_what_it_found(
-    module: object, bound: str, name: str, monkeypatch: pytest.MonkeyPatch, judge: Judge
-) -> None:
+def test_too_many_pairs_end_a_check_which_says_what_it_found(module, bound, name, monkeypatch, judge):
     monkeypatch.setattr(module, bound, 20)
     monkeypatch.setattr(crossings, "_LOOKS", 0)
     body = np.concatenate([box(at=(i, i, i)) for i in range(20)])
@@ -91,7 +84,7 @@ def test_too_many_pairs_end_a_check_which_says_what_it_found(
     assert report.facts.shells == 21
 
 
-def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypatch):
     low = np.random.default_rng(1).uniform(0, 4, (400, 3))
     high = low + 1
     meet = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
@@ -106,7 +99,7 @@ def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypat
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of memory there")
 @pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
-def test_a_file_larger_than_the_memory_allows_is_refused_by_its_size(name: str, tmp_path: Path) -> None:
+def test_a_file_larger_than_the_memory_allows_is_refused_by_its_size(name, tmp_path):
     with (tmp_path / name).open("wb") as file:
         file.truncate(260_000_000)
     done = subprocess.run(

@@ -1,7 +1,5 @@
 """Small files that were judged wrongly, each with its right verdict."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -45,7 +43,7 @@ RIGHT = [
 
 
 @pytest.mark.parametrize(("name", "given", "right"), RIGHT, ids=lambda value: str(value))
-def test_the_verdict_is_right(name: str, given: dict, right: dict[str, str]) -> None:
+def test_the_verdict_is_right(name, given, right):
     report = check_file(CASES / name, options(**given))
     assert {found.code: found.severity for found in report.findings} == right
 
@@ -54,11 +52,11 @@ def test_the_verdict_is_right(name: str, given: dict, right: dict[str, str]) -> 
     ("name", "box"),
     [("bambu_modifier.3mf", ((100, 100, 0), (120, 120, 20))), ("unref_far.3mf", ((0, 0, 0), (10, 10, 10)))],
 )
-def test_only_what_is_built_has_a_size(name: str, box: tuple) -> None:
+def test_only_what_is_built_has_a_size(name, box):
     assert check_file(CASES / name).facts.bbox_mm == box
 
 
-def test_a_bar_of_five_metres_fits_no_printer() -> None:
+def test_a_bar_of_five_metres_fits_no_printer():
     pytest.importorskip("OCP")
     report = check_file(CASES / "long_5m.step", options(**FDM))
     found = {finding.code: finding.severity for finding in report.findings}

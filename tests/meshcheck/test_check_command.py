@@ -1,7 +1,5 @@
 """`unitcad check` as a person or a CI job runs it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -18,7 +16,6 @@ from shapes import box, stl
 
 from tests.in_process import unitcad
 from unitcad.meshcheck.rules import t_topology
-from unitcad.meshcheck.rules.inspection import Inspection
 
 GOOD, HOLE, WARN = stl(box()), stl(box()[2:]), stl(box(), header=b"solid")
 
@@ -27,7 +24,7 @@ run = partial(unitcad, "check")
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "good.stl").write_bytes(GOOD)
     (tmp_path / "sub" / "hole.stl").write_bytes(HOLE)
@@ -36,7 +33,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_exit_codes(folder: Path) -> None:
+def test_exit_codes(folder):
     assert run("good.stl", cwd=folder).returncode == 0
     assert run("sub/hole.stl", cwd=folder).returncode == 1
     assert run("sub/warn.STL", cwd=folder).returncode == 0
@@ -50,7 +47,7 @@ def test_exit_codes(folder: Path) -> None:
         assert "Traceback" not in result.stderr
 
 
-def test_reports_are_written_beside_the_one_that_is_printed(folder: Path) -> None:
+def test_reports_are_written_beside_the_one_that_is_printed(folder):
     copies = ("--report", "json=new folder/all.json", "--report", "junit=all.xml")
     result = run("sub", *copies, "--output-format", "github", cwd=folder)
     assert result.returncode == 1
@@ -63,7 +60,7 @@ def test_reports_are_written_beside_the_one_that_is_printed(folder: Path) -> Non
     ("all.json", "must be FORMAT=FILE"), ("json=", "must be FORMAT=FILE"), ("xml=a.xml", "--report = 'xml'"),
     ("json=sub", "this is a folder"), ("json=good.stl/a.json", "--report: good.stl/a.json: "),
 ])  # fmt: skip
-def test_a_wrong_report_is_one_sentence_and_nothing_is_written(folder: Path, given: str, said: str) -> None:
+def test_a_wrong_report_is_one_sentence_and_nothing_is_written(folder, given, said):
     before = sorted(folder.rglob("*"))
     result = run("good.stl", "--report", given, cwd=folder)
     assert result.returncode == 2
@@ -72,7 +69,7 @@ def test_a_wrong_report_is_one_sentence_and_nothing_is_written(folder: Path, giv
     assert sorted(folder.rglob("*")) == before
 
 
-def test_folders_and_globs(folder: Path) -> None:
+def test_folders_and_globs(folder):
     data = json.loads(run(".", "--json", cwd=folder).stdout)
     assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl", "sub/warn.STL"]
     data = json.loads(run("**/*.stl", "--json", cwd=folder).stdout)
@@ -89,7 +86,7 @@ def test_folders_and_globs(folder: Path) -> None:
         assert codes[name] == "F012"
 
 
-def test_hidden_folders_and_loops_are_left_out_and_each_file_is_judged_once(folder: Path) -> None:
+def test_hidden_folders_and_loops_are_left_out_and_each_file_is_judged_once(folder):
     (folder / ".git").mkdir()
     (folder / ".git" / "old.stl").write_bytes(HOLE)
     (folder / "sub" / "again.stl").symlink_to(folder / "good.stl")
@@ -99,13 +96,13 @@ def test_hidden_folders_and_loops_are_left_out_and_each_file_is_judged_once(fold
         assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl", "sub/warn.STL"]
 
 
-def test_jobs_give_the_same_answer(folder: Path) -> None:
+def test_jobs_give_the_same_answer(folder):
     one, two = run(".", "--json", cwd=folder), run(".", "--json", "--jobs", "2", cwd=folder)
     assert one.stdout == two.stdout
     assert one.returncode == two.returncode == 1
 
 
-def test_statistics_explain_and_select(folder: Path) -> None:
+def test_statistics_explain_and_select(folder):
     out = run(".", "--statistics", cwd=folder).stdout
     assert "     1 file          4 x  T001 boundary edge" in out
     explained = run("--explain", "t001")
@@ -117,7 +114,7 @@ def test_statistics_explain_and_select(folder: Path) -> None:
     assert run("sub/hole.stl", "--select", "F", "--extend-select", "T001", cwd=folder).returncode == 1
 
 
-def test_statistics_leave_a_machine_format_whole(folder: Path) -> None:
+def test_statistics_leave_a_machine_format_whole(folder):
     table = run(".", "--statistics", cwd=folder).stdout
     for format_ in ("json", "sarif", "junit", "github"):
         plain = run(".", "--output-format", format_, cwd=folder)
@@ -128,7 +125,7 @@ def test_statistics_leave_a_machine_format_whole(folder: Path) -> None:
         assert plain.stderr == ""
 
 
-def test_statistics_count_findings_and_not_bytes(folder: Path) -> None:
+def test_statistics_count_findings_and_not_bytes(folder):
     (folder / "bare").mkdir()
     (folder / "bare" / "long.stl").write_bytes(GOOD + bytes(77))
     (folder / "bare" / "cut.stl").write_bytes(GOOD[:-150])
@@ -136,7 +133,7 @@ def test_statistics_count_findings_and_not_bytes(folder: Path) -> None:
     assert sorted(" ".join(line.split()[:5]) for line in lines) == ["1 file 1 x F002", "1 file 1 x F006"]
 
 
-def test_limits_unit_and_printer(folder: Path) -> None:
+def test_limits_unit_and_printer(folder):
     assert "F011" in run("good.stl", "--max-faces", "5", cwd=folder).stdout
     assert "S001" in run("good.stl", "--unit", "meter", cwd=folder).stdout
     (folder / "film.stl").write_bytes(stl(box((20, 20, 0.2))))
@@ -148,12 +145,12 @@ def test_limits_unit_and_printer(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("unit", "mm"), [("mm", 1), ("CM", 10), ("m", 1000), ("in", 25.4), ("Inches", 25.4), ("ft", 304.8), ("INCH", 25.4)]
 )
-def test_units_by_their_short_names(folder: Path, unit: str, mm: float) -> None:
+def test_units_by_their_short_names(folder, unit, mm):
     data = json.loads(run("good.stl", "--unit", unit, "--json", cwd=folder).stdout)
     assert data["files"][0]["facts"]["volume_mm3"] == pytest.approx((10 * mm) ** 3, rel=1e-12)
 
 
-def test_a_manifest_holds_the_files_that_are_not_judged(folder: Path) -> None:
+def test_a_manifest_holds_the_files_that_are_not_judged(folder):
     step = folder / "unit.step"
     step.write_bytes(b"ISO-10303-21; not judged here")
     listed = {"path": "unit.step", "sha256": hashlib.sha256(step.read_bytes()).hexdigest()}
@@ -161,7 +158,7 @@ def test_a_manifest_holds_the_files_that_are_not_judged(folder: Path) -> None:
     part = {"name": "a", "role": "unit", "volume_mm3": 1000.0, "files": files}
     (folder / "manifest.json").write_text(json.dumps({"parts": [part]}))
 
-    def codes(*more: str) -> tuple[int, dict[str, list[str]]]:
+    def codes(*more):
         result = run("--manifest", str(folder), "--json", *more, cwd=folder / "sub")
         entries = json.loads(result.stdout)["files"]
         return result.returncode, {entry["path"]: [f["code"] for f in entry["findings"]] for entry in entries}
@@ -188,7 +185,7 @@ def test_a_manifest_holds_the_files_that_are_not_judged(folder: Path) -> None:
         ("", "not JSON: Expecting value: line 1 column 1 (char 0)"),
     ],
 )
-def test_a_bad_manifest_is_one_sentence(folder: Path, content: str, said: str) -> None:
+def test_a_bad_manifest_is_one_sentence(folder, content, said):
     (folder / "manifest.json").write_text(content)
     result = run("--manifest", "manifest.json", cwd=folder)
     assert result.returncode == 2
@@ -197,7 +194,7 @@ def test_a_bad_manifest_is_one_sentence(folder: Path, content: str, said: str) -
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_an_stl_is_judged_without_cad_trimesh_or_scipy(tmp_path: Path) -> None:
+def test_an_stl_is_judged_without_cad_trimesh_or_scipy(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(np.concatenate([box(), box(at=(20, 0, 0)), box(at=(0, 20, 0))])))
     code = (
         "import sys, unitcad.meshcheck as c\nc.Options()\nassert 'msgspec' not in sys.modules\n"
@@ -211,7 +208,7 @@ def test_an_stl_is_judged_without_cad_trimesh_or_scipy(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs")
-def test_what_is_no_file_in_a_folder_is_found(tmp_path: Path) -> None:
+def test_what_is_no_file_in_a_folder_is_found(tmp_path):
     (tmp_path / "good.stl").write_bytes(GOOD)
     (tmp_path / "gone.stl").symlink_to(tmp_path / "nothing.stl")
     os.mkfifo(tmp_path / "pipe.stl")
@@ -228,17 +225,17 @@ def test_what_is_no_file_in_a_folder_is_found(tmp_path: Path) -> None:
         (["--json", "--output-format", "sarif"], "--output-format = 'sarif': --json asks for another one"),
     ],
 )
-def test_options_that_can_not_be_are_refused_before_the_work(words: list[str], said: str, tmp_path: Path) -> None:
+def test_options_that_can_not_be_are_refused_before_the_work(words, said, tmp_path):
     (tmp_path / "hole.stl").write_bytes(HOLE)
     done = run("hole.stl", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert said in done.stderr + done.stdout
 
 
-def test_few_files_and_frames_lie_between_the_command_and_a_rule(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_files_and_frames_lie_between_the_command_and_a_rule(folder, monkeypatch):
     package, stacks, rule = str(Path(t_topology.__file__).parents[2]), [], t_topology.check_mesh
 
-    def spy(part: Inspection) -> object:
+    def spy(part):
         stacks.append([frame for frame in traceback.extract_stack() if frame.filename.startswith(package)])
         return rule(part)
 

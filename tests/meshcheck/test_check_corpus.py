@@ -3,8 +3,6 @@
 The samples that must fail are judged strictly: what real programs write all the same is a warning otherwise.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -16,17 +14,17 @@ SAMPLES = CORPUS / "3mf-samples"
 
 
 @pytest.mark.parametrize("path", sorted((SAMPLES / "MUSTFAIL").glob("*.3mf")), ids=lambda path: path.stem[9:])
-def test_must_fail(path: Path) -> None:
+def test_must_fail(path):
     assert check_file(path, Options(strict_3mf=True)).verdict == "error"
 
 
 @pytest.mark.parametrize("strict", [False, True])
 @pytest.mark.parametrize("path", sorted((SAMPLES / "MUSTPASS").glob("*.3mf")), ids=lambda path: path.stem[9:])
-def test_must_pass(path: Path, strict: bool) -> None:
+def test_must_pass(path, strict):
     assert check_file(path, Options(strict_3mf=strict)).verdict != "error"
 
 
-def test_the_corpus_is_there() -> None:
+def test_the_corpus_is_there():
     assert len(list((SAMPLES / "MUSTFAIL").glob("*.3mf"))) == 38
     assert len(list((SAMPLES / "MUSTPASS").glob("*.3mf"))) == 13
     assert len(list((CORPUS / "numpy-stl").rglob("*.stl"))) == 16

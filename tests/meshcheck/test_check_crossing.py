@@ -1,7 +1,5 @@
 """Self-crossing against an independent reference in fractions, and on solids whose answer is known."""
 
-from __future__ import annotations
-
 import time
 from fractions import Fraction
 
@@ -22,7 +20,7 @@ from unitcad.meshcheck.rules.registry import explain
 
 
 @pytest.mark.parametrize("kind", ["grid", "grid sharing a corner", "random", "random sharing a corner"])
-def test_triangles_meet_as_fractions_say(kind: str) -> None:
+def test_triangles_meet_as_fractions_say(kind):
     rng = np.random.default_rng(7)
     corners = rng.integers(-2, 3, (700, 2, 3, 3)).astype(float) if "grid" in kind else rng.normal(size=(700, 2, 3, 3))
     if "corner" in kind:
@@ -43,7 +41,7 @@ def test_triangles_meet_as_fractions_say(kind: str) -> None:
 
 
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 40), (200, 77), (300, 4)])
-def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
+def test_box_pairs_are_all_that_meet(n, m):
     rng = np.random.default_rng(0)
     low = rng.random((n + m, 3))
     places = np.concatenate([low, low + 0.1])
@@ -52,7 +50,7 @@ def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
     both_sets = boxes_of(steps, rows, rows + n + m)
     boxes, others = both_sets[:n].astype(int), both_sets[n:].astype(int)
 
-    def naive(a, b) -> bool:
+    def naive(a, b):
         return bool((a[:3] <= 65_535 - b[3:]).all() and (b[:3] <= 65_535 - a[3:]).all())
 
     own = {
@@ -71,7 +69,7 @@ def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
     assert both >= {(int(a), int(b)) for a, b in np.argwhere(~apart)}  # steps lose no pair
 
 
-def _codes(*parts: tuple[np.ndarray, np.ndarray]) -> set[str]:
+def _codes(*parts):
     points, faces, start = [], [], 0
     for corners, triangles in parts:
         points.append(corners * 10)
@@ -99,19 +97,19 @@ TURN = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
     ],
     ids=["apart", "stacked", "stacked aside", "edge", "corner", "pierced", "half in", "inside", "through edges"],
 )
-def test_two_cubes(corners: np.ndarray, expected: set[str]) -> None:
+def test_two_cubes(corners, expected):
     assert _codes(CUBE, (corners, CUBE_FACES)) == expected
     assert _codes((corners, CUBE_FACES), CUBE) == expected
 
 
-def test_cavity_and_inverted_shell() -> None:
+def test_cavity_and_inverted_shell():
     inner = CUBE_CORNERS * 0.5 + 0.25
     assert _codes(CUBE, (inner, CUBE_FACES[:, ::-1])) == {"G006"}
     assert _codes((CUBE_CORNERS, CUBE_FACES[:, ::-1])) == {"T008"}
     assert _codes(CUBE, (inner, CUBE_FACES[:, ::-1]), (CUBE_CORNERS * 0.2 + 0.4, CUBE_FACES)) == {"G006"}
 
 
-def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
+def _sphere(n):
     """A torus knot-free tube: a torus of n x n quads, wavy, so that nothing is coplanar."""
     u, v = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.arange(n) * 2 * np.pi / n, indexing="ij")
     r = 8 + 0.3 * np.sin(9 * u) * np.sin(7 * v)
@@ -122,7 +120,7 @@ def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
     return points.reshape(-1, 3), faces
 
 
-def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through() -> None:
+def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through():
     points, faces = _sphere(60)
     assert check_mesh(points, faces).findings == ()
     moved = points.copy()
@@ -132,7 +130,7 @@ def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through() -> None
 
 
 @pytest.mark.parametrize("mesh", ["closed", "with holes", "with faces turned over"])
-def test_crossing_count_equals_brute_force(mesh: str) -> None:
+def test_crossing_count_equals_brute_force(mesh):
     points, faces = _sphere(6)
     rng = np.random.default_rng(2)
     points = points + rng.normal(scale=2.5, size=points.shape)
@@ -146,7 +144,7 @@ def test_crossing_count_equals_brute_force(mesh: str) -> None:
     assert crossing.count == counts(points, faces)[0] > 0
 
 
-def test_one_missing_face_does_not_make_it_slow() -> None:
+def test_one_missing_face_does_not_make_it_slow():
     """Faces round a vertex are left aside wherever they surround it, hole or no hole elsewhere."""
     points, faces = _sphere(100)
     start = time.perf_counter()
@@ -158,7 +156,7 @@ def test_one_missing_face_does_not_make_it_slow() -> None:
     assert time.perf_counter() - start - closed < 10 * closed + 0.5
 
 
-def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning() -> None:
+def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning():
     """Warnings are errors here; the coordinates' exponents lie farther apart than a float's range."""
     values = np.array([[0.0, 1e-320, 10.0]])
     whole = integers(values).astype(object)[0].tolist()
@@ -167,14 +165,14 @@ def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning() -> No
 
 
 @pytest.mark.parametrize("code", ["G001", "G002", "P019"])
-def test_rules_that_are_softer_in_some_files_say_so(code: str) -> None:
+def test_rules_that_are_softer_in_some_files_say_so(code):
     assert "3MF" in explain(code)
     assert "warning" in explain(code).split("\n", 1)[1]
 
 
 @pytest.mark.parametrize("code", ["G002", "G003"])
 @pytest.mark.parametrize(("shared", "overlap"), [(0.0, False), (0.9e-6, False), (1.1e-6, True)])
-def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code: str, shared: float, overlap: bool) -> None:
+def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code, shared, overlap):
     assert "a millionth of the smaller one" in explain(code)
     points = np.concatenate([CUBE_CORNERS, CUBE_CORNERS * [2, 1, 1] + [1 - shared, 0, 0]]) * 10
     found = {item.code for item in check_mesh(points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])).findings}
@@ -182,7 +180,7 @@ def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code: str, 
     assert ("G002" in found) == overlap
 
 
-def _two(scale: tuple[float, float, float], at: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _two(scale, at):
     """A cube of 10 mm and a second box."""
     points = np.concatenate([CUBE_CORNERS * 10, CUBE_CORNERS * scale + np.array(at)])
     return points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])
@@ -201,9 +199,7 @@ def _two(scale: tuple[float, float, float], at: tuple[float, float, float]) -> t
     ],
 )
 @pytest.mark.parametrize("shift", [0.0, 777.7])
-def test_places_are_where_the_shells_meet_and_differ(
-    code: str, scale: tuple, at: tuple, low: tuple, high: tuple, shift: float
-) -> None:
+def test_places_are_where_the_shells_meet_and_differ(code, scale, at, low, high, shift):
     points, faces = _two(scale, at)
     report = check_mesh(points + shift, faces)
     places = finding(report, code).locations
@@ -214,7 +210,7 @@ def test_places_are_where_the_shells_meet_and_differ(
     assert code in ("G002", "G003") or len({place.face for place in places}) == len(places) > 1
 
 
-def test_touching_shells_are_placed_pair_by_pair() -> None:
+def test_touching_shells_are_placed_pair_by_pair():
     boxes = [CUBE_CORNERS * 10 + [10 * k, 0, 0] for k in range(4)]
     report = check_mesh(np.concatenate(boxes), np.concatenate([CUBE_FACES + 8 * k for k in range(4)]))
     places = finding(report, "G003").locations
@@ -233,7 +229,7 @@ def test_touching_shells_are_placed_pair_by_pair() -> None:
     ],
 )
 @pytest.mark.parametrize("scale", [1.0, 1e38, 1e-150])
-def test_the_middle_of_what_two_triangles_share(other: list, expected: tuple | None, scale: float) -> None:
+def test_the_middle_of_what_two_triangles_share(other, expected, scale):
     found = common_point(*(scale * np.array(corners) for corners in ([[0, 0, 0], [6, 0, 0], [0, 6, 0]], other)))
     assert (found is None) == (expected is None)
     if found is not None and expected is not None:

@@ -1,19 +1,17 @@
 """Crossings, overlaps and folds too shallow for a printer are warnings; what is deep is an error, however it is cut."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, Judge, box, in_format, stl, turned
+from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turned
 
 Points = np.ndarray
 
 
-def severities(report) -> dict[str, str]:
+def severities(report):
     return {found.code: found.severity for found in report.findings if found.code in ("G001", "G002", "G008", "G009")}
 
 
-def pieces(triangles: Points, times: int) -> Points:
+def pieces(triangles, times):
     """The same surface with each triangle cut into four, again and again."""
     for _ in range(times):
         a, b, c = triangles.transpose(1, 0, 2)
@@ -22,7 +20,7 @@ def pieces(triangles: Points, times: int) -> Points:
     return triangles
 
 
-def strips(n: int, at: float, up: bool) -> Points:
+def strips(n, at, up):
     """A square of 20 mm as n strips, each two long triangles, at the height `at`."""
     x = np.linspace(0, 20, n + 1)
     a, b = (np.stack([x, np.full(n + 1, y), np.full(n + 1, at)], axis=1) for y in (0.0, 20.0))
@@ -32,7 +30,7 @@ def strips(n: int, at: float, up: bool) -> Points:
 
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize(("depth", "right"), [(1e-5, "warning"), (0.0056, "warning"), (0.05, "error"), (3.0, "error")])
-def test_two_boxes_by_the_depth_of_their_overlap(depth: float, right: str, name: str, judge: Judge) -> None:
+def test_two_boxes_by_the_depth_of_their_overlap(depth, right, name, judge):
     """3MF's fill rule settles what crosses, whatever its depth."""
     content = in_format(np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]), name)
     found = severities(judge(content, name))
@@ -43,13 +41,13 @@ def test_two_boxes_by_the_depth_of_their_overlap(depth: float, right: str, name:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_turned_boxes_overlap_as_those_that_stand(seed: int, judge: Judge) -> None:
+def test_turned_boxes_overlap_as_those_that_stand(seed, judge):
     both = {depth: np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]) for depth in (0.001, 0.5)}
     found = [severities(judge(stl(turned(body, seed, shift=20)))) for body in both.values()]
     assert [set(codes.values()) for codes in found] == [{"warning"}, {"error"}]
 
 
-def test_the_message_says_the_depth(judge: Judge) -> None:
+def test_the_message_says_the_depth(judge):
     (crossing,) = [
         found
         for found in judge(stl(np.concatenate([box(), box((6, 6, 10), (2, 2, 9.995))]))).findings
@@ -60,9 +58,7 @@ def test_the_message_says_the_depth(judge: Judge) -> None:
 
 @pytest.mark.parametrize("times", [0, 3, 5])
 @pytest.mark.parametrize("offset", [0.0, 1e-9, 1e-6, 0.3])
-def test_a_deep_crossing_is_an_error_however_fine_or_aligned_its_faces_are(
-    times: int, offset: float, judge: Judge
-) -> None:
+def test_a_deep_crossing_is_an_error_however_fine_or_aligned_its_faces_are(times, offset, judge):
     """One shell that crosses itself: a bar of 8 mm through a plate, both open, so that no volume tells.
 
     With small offsets the edges of one nearly lie on the faces of the other.
@@ -77,7 +73,7 @@ def test_a_deep_crossing_is_an_error_however_fine_or_aligned_its_faces_are(
 
 
 @pytest.mark.parametrize("times", [0, 2, 4])
-def test_a_small_deep_crossing_of_fine_faces_is_an_error(times: int, judge: Judge) -> None:
+def test_a_small_deep_crossing_of_fine_faces_is_an_error(times, judge):
     """Faces far smaller than what is called shallow: 0.5 mm in pieces of 0.03 mm and less."""
     scale = 0.1
     both = np.concatenate([box(), box((6, 6, 10), (2.1, 2.2, 5.03))]) * scale
@@ -85,7 +81,7 @@ def test_a_small_deep_crossing_of_fine_faces_is_an_error(times: int, judge: Judg
 
 
 @pytest.mark.parametrize(("n", "m"), [(1, 5), (1, 1999), (7, 5), (2000, 1), (2000, 1999)])
-def test_a_fin_without_thickness_is_an_error_however_its_sides_are_cut(n: int, m: int, judge: Judge) -> None:
+def test_a_fin_without_thickness_is_an_error_however_its_sides_are_cut(n, m, judge):
     """Both sides of a square in one plane, one cut into n strips, the other into m: strips of 0.01 mm and wider."""
     found = severities(judge(stl(np.concatenate([strips(n, 0, True), strips(m, 0, False)]))))
     assert found["G009"] == "error"
@@ -93,7 +89,7 @@ def test_a_fin_without_thickness_is_an_error_however_its_sides_are_cut(n: int, m
 
 @pytest.mark.parametrize(("width", "right"), [(1e-4, "warning"), (3e-4, "warning"), (0.009, "warning"), (0.1, "error")])
 @pytest.mark.parametrize("name", ["binary.stl", "part.ply", "part.obj"])
-def test_a_vertex_across_its_neighbours_edge_folds_the_top(width: float, right: str, name: str, judge: Judge) -> None:
+def test_a_vertex_across_its_neighbours_edge_folds_the_top(width, right, name, judge):
     """The top of a cube of 20 mm has a vertex in its middle, `width` across the diagonal that it should lie on."""
     corners = np.concatenate([CUBE_CORNERS * 20, [[10 + width / np.sqrt(2), 10 - width / np.sqrt(2), 20]]])
     rest = np.array([face for face in CUBE_FACES if not {*face.tolist()} <= {1, 3, 5, 7}])
@@ -107,7 +103,7 @@ def test_a_vertex_across_its_neighbours_edge_folds_the_top(width: float, right: 
     assert "G009" in found
 
 
-def test_a_foil_that_lies_in_a_box_is_an_error(judge: Judge) -> None:
+def test_a_foil_that_lies_in_a_box_is_an_error(judge):
     """All of it is shared, though it is thinner than what is called shallow."""
     found = severities(judge(stl(np.concatenate([box(), box((6, 6, 0.01), (2, 2, 5))]))))
     assert found == {"G002": "error"}
@@ -115,7 +111,7 @@ def test_a_foil_that_lies_in_a_box_is_an_error(judge: Judge) -> None:
 
 @pytest.mark.parametrize("more", [0, 1, 3])
 @pytest.mark.parametrize("seed", [None, 0, 1])
-def test_faces_without_area_back_to_back_are_that_alone(more: int, seed: int | None, judge: Judge) -> None:
+def test_faces_without_area_back_to_back_are_that_alone(more, seed, judge):
     """Beside a cube and apart from it, some pairs of faces whose corners lie on a line."""
     lines = [np.array([[20, 0, z], [22, 0, z], [24, 0, z]], float) for z in range(more + 1)]
     pairs = np.array([face for line in lines for face in (line, line[::-1])])
@@ -126,7 +122,7 @@ def test_faces_without_area_back_to_back_are_that_alone(more: int, seed: int | N
     assert {found.code: found.severity for found in report.findings} == {"T010": "warning"}
 
 
-def test_a_file_of_faces_without_area_only_has_no_volume(judge: Judge) -> None:
+def test_a_file_of_faces_without_area_only_has_no_volume(judge):
     line = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0]], float)
     report = judge(stl(np.array([line, line[::-1]])))
     assert report.has("G007")

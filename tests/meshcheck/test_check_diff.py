@@ -1,10 +1,7 @@
 """`unitcad check --diff`: largest distance against exact values, new and gone findings, exit codes."""
 
-from __future__ import annotations
-
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,16 +17,16 @@ PLATE = Manifold.cube([20, 20, 4])
 HOLE = Manifold.cylinder(10, 3, 3, 64).translate([10, 10, -1])
 
 
-def _mesh(solid: Manifold) -> trimesh.Trimesh:
+def _mesh(solid):
     mesh = solid.to_mesh64()
     return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
 
 
-def _stl(solid: Manifold) -> bytes:
+def _stl(solid):
     return stl(_mesh(solid).triangles)
 
 
-def _ball(radius: float) -> Manifold:
+def _ball(radius):
     return Manifold.sphere(radius, 200)
 
 
@@ -44,7 +41,7 @@ def _ball(radius: float) -> Manifold:
         (PLATE + Manifold.cube([0.1, 0.1, 5]).translate([3, 3, 3]), PLATE, 4.0),
     ],
 )
-def test_the_distance_is_within_its_error_of_the_exact_one(one: Manifold, other: Manifold, exact: float) -> None:
+def test_the_distance_is_within_its_error_of_the_exact_one(one, other, exact):
     found, points, distances = largest_distance(_mesh(one), _mesh(other), spacing := 0.3)
     assert len(points) == len(distances)
     assert found == distances.max()
@@ -56,7 +53,7 @@ def test_the_distance_is_within_its_error_of_the_exact_one(one: Manifold, other:
 
 
 @pytest.fixture
-def versions(tmp_path: Path) -> tuple[Path, Path]:
+def versions(tmp_path):
     old, new = tmp_path / "old", tmp_path / "new"
     for folder in (old, new):
         folder.mkdir()
@@ -71,7 +68,7 @@ def versions(tmp_path: Path) -> tuple[Path, Path]:
     return old, new
 
 
-def test_only_new_findings_fail(versions: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_new_findings_fail(versions, tmp_path, monkeypatch):
     monkeypatch.setattr(check_diff, "SAMPLES", 40)  # which takes a sixth of the time
     old, new = (str(folder) for folder in versions)
     result = run("--diff", old, new, "--pictures", str(tmp_path / "pictures"))
@@ -95,7 +92,7 @@ def test_only_new_findings_fail(versions: tuple[Path, Path], tmp_path: Path, mon
     assert (result.returncode, "| volume, mm3 | 1600 | 1487" in result.stdout) == (0, True)
 
 
-def test_a_hole_in_another_place_is_a_new_finding(tmp_path: Path) -> None:
+def test_a_hole_in_another_place_is_a_new_finding(tmp_path):
     whole = box()
     (tmp_path / "a.stl").write_bytes(stl(whole[1:]))
     (tmp_path / "b.stl").write_bytes(stl(np.delete(whole, 6, axis=0)))
@@ -111,7 +108,7 @@ def test_a_hole_in_another_place_is_a_new_finding(tmp_path: Path) -> None:
         (["a.stl", "a.stl", "a.stl"], "leave out other files"),
     ],
 )
-def test_refusals(arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refusals(arguments, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.stl").write_bytes(stl(box()))

@@ -1,7 +1,5 @@
 """What a path may be: sizes are looked at before anything is read, and only regular files are opened."""
 
-from __future__ import annotations
-
 import os
 import socket
 import sys
@@ -14,7 +12,7 @@ from shapes import box, stl
 from unitcad.meshcheck import Limits, Options, check_file
 
 
-def test_a_sparse_file_beyond_the_limit_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_sparse_file_beyond_the_limit_is_refused_at_once(tmp_path):
     with (tmp_path / "a.stl").open("wb") as file:
         file.truncate(20_000_000_000)
     begin = time.perf_counter()
@@ -23,14 +21,14 @@ def test_a_sparse_file_beyond_the_limit_is_refused_at_once(tmp_path: Path) -> No
     assert (found.code, found.message) == ("F011", "20000000000 bytes, more than the limit of 4000000000")
 
 
-def test_the_limit_itself_is_allowed(tmp_path: Path) -> None:
+def test_the_limit_itself_is_allowed(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box()))
     assert check_file(tmp_path / "a.stl", Options(limits=Limits(max_bytes=684))).verdict == "pass"
     assert check_file(tmp_path / "a.stl", Options(limits=Limits(max_bytes=683))).has("F011")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX kinds of files")
-def test_what_is_no_regular_file_is_named_and_never_opened(tmp_path: Path) -> None:
+def test_what_is_no_regular_file_is_named_and_never_opened(tmp_path):
     os.mkfifo(tmp_path / "a.stl")
     (tmp_path / "b.stl").mkdir()
     with socket.socket(socket.AF_UNIX) as made:

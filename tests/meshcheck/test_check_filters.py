@@ -1,10 +1,7 @@
 """No filter makes a file pass that was not judged."""
 
-from __future__ import annotations
-
 import json
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +14,7 @@ FILTERS = (["--select", "G"], ["--ignore", "F,P,V"], ["--select", "T,G", "--igno
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     (tmp_path / "page.stl").write_bytes(b"<!DOCTYPE html><html></html>")
     (tmp_path / "cut.stl").write_bytes(stl(box())[:-80])
     (tmp_path / "none.stl").write_bytes(stl(box()[:0]))
@@ -37,7 +34,7 @@ def folder(tmp_path: Path) -> Path:
     "name",
     ["page.stl", "cut.stl", "none.stl", "nan.stl", "cut.3mf", "xml.3mf", "index.3mf", "bomb.3mf"],
 )
-def test_what_ended_the_judgement_survives_every_filter(folder: Path, name: str, chosen: list[str]) -> None:
+def test_what_ended_the_judgement_survives_every_filter(folder, name, chosen):
     result = run(name, "--json", *chosen, cwd=folder)
     (entry,) = json.loads(result.stdout)["files"]
     assert (result.returncode, entry["verdict"]) == (1, "error")
@@ -45,25 +42,25 @@ def test_what_ended_the_judgement_survives_every_filter(folder: Path, name: str,
 
 
 @pytest.mark.parametrize("chosen", FILTERS, ids=" ".join)
-def test_a_limit_survives_every_filter(folder: Path, chosen: list[str]) -> None:
+def test_a_limit_survives_every_filter(folder, chosen):
     result = run("good.stl", "--max-faces", "3", *chosen, cwd=folder)
     assert result.returncode == 1
     assert "F011" in result.stdout
     assert run("good.stl", *chosen, cwd=folder).returncode == 0
 
 
-def test_a_build_without_an_item_is_said_whatever_is_selected(folder: Path) -> None:
+def test_a_build_without_an_item_is_said_whatever_is_selected(folder):
     result = run("bare.3mf", "--select", "G", cwd=folder)
     assert "P014 warning" in result.stdout
     assert run("bare.3mf", "--select", "G", "--fail-on", "warning", cwd=folder).returncode == 1
 
 
-def test_a_mesh_in_memory_that_cannot_be_judged_survives_too() -> None:
+def test_a_mesh_in_memory_that_cannot_be_judged_survives_too():
     report = check_mesh(CUBE_CORNERS, np.array([[0, 1, 9]]), Options(select=("G",)))
     assert [found.code for found in report.findings] == ["P011"]
 
 
-def test_faults_beside_the_judgement_are_filtered_as_asked(folder: Path) -> None:
+def test_faults_beside_the_judgement_are_filtered_as_asked(folder):
     (folder / "warn.stl").write_bytes(stl(box()[2:], header=b"solid"))
     assert run("warn.stl", "--ignore", "T,F", cwd=folder).returncode == 0
     assert "F007" not in run("warn.stl", "--select", "T", cwd=folder).stdout

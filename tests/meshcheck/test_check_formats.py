@@ -1,7 +1,5 @@
 """Output formats, the rule table and its page, select and ignore."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
@@ -28,7 +26,7 @@ HERE = Path(__file__).parent
 
 
 @pytest.fixture
-def reports(tmp_path: Path) -> list[FileReport]:
+def reports(tmp_path):
     names = {"good.stl": stl(box()), "hole & <b>.stl": stl(box()[2:]), "text.stl": text_stl(box())[:-30].encode()}
     names["warn, 100%.stl"] = stl(box(), header=b"solid")
     found = []
@@ -38,7 +36,7 @@ def reports(tmp_path: Path) -> list[FileReport]:
     return [FileReport(Path(report.path).name, report.findings, report.facts) for report in found]
 
 
-def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
+def test_json_has_the_promised_shape(reports):
     data = json.loads(render(reports, "json"))
     assert list(data) == ["files", "config", "baseline"]
     for entry, report in zip(data["files"], reports, strict=True):
@@ -53,7 +51,7 @@ def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
     assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
 
 
-def test_sarif_is_valid_and_complete(reports: list[FileReport]) -> None:
+def test_sarif_is_valid_and_complete(reports):
     data = json.loads(render(reports, "sarif"))
     schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -66,7 +64,7 @@ def test_sarif_is_valid_and_complete(reports: list[FileReport]) -> None:
         assert " " not in result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
 
 
-def test_the_sarif_schema_refuses_what_sarif_does(reports: list[FileReport]) -> None:
+def test_the_sarif_schema_refuses_what_sarif_does(reports):
     schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
     for spoil in (
         lambda data: data.update(version="2.0.0"),
@@ -82,8 +80,8 @@ def test_the_sarif_schema_refuses_what_sarif_does(reports: list[FileReport]) -> 
             jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
 
 
-def test_fingerprints_stay_when_counts_and_places_change(tmp_path: Path) -> None:
-    def prints(content: bytes) -> set[str]:
+def test_fingerprints_stay_when_counts_and_places_change(tmp_path):
+    def prints(content):
         path = tmp_path / "a.stl"
         path.write_bytes(content)
         data = json.loads(render([check_file(path)], "sarif"))
@@ -92,7 +90,7 @@ def test_fingerprints_stay_when_counts_and_places_change(tmp_path: Path) -> None
     assert prints(stl(box()[2:])) == prints(stl(box((20, 20, 20))[4:])) != set()
 
 
-def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
+def test_github_annotations_are_escaped(reports):
     *lines, last = render(reports, "github").splitlines()
     assert last == "4 files: 2 failed, 1 warned, 1 passed"
     assert len(lines) == sum(len(report.findings) for report in reports)
@@ -101,7 +99,7 @@ def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
     assert any("::error file=text.stl,line=" in line for line in lines)
 
 
-def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
+def test_junit_parses_and_counts(reports):
     suite = ET.fromstring(render(reports, "junit"))[0]
     assert (suite.get("tests"), suite.get("failures")) == ("4", "2")
     strict = ET.fromstring(render(reports, "junit", "warning"))[0]
@@ -109,7 +107,7 @@ def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
     assert [case.get("name") for case in suite] == [report.path for report in reports]
 
 
-def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
+def test_text_is_one_line_a_finding_and_holds_no_control_characters():
     odd = FileReport("a\x1b[31m\n.stl", (Finding("F003", "error", "bad \x07 text", 1, (Location(line=3),)),))
     lines = render([odd], "text").splitlines()
     assert lines == [
@@ -122,7 +120,7 @@ def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
     assert render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
 
 
-def test_markdown_is_a_table_that_no_name_leaves(reports: list[FileReport]) -> None:
+def test_markdown_is_a_table_that_no_name_leaves(reports):
     lines = render(reports, "markdown").splitlines()
     assert lines[:3] == ["## unitcad check", "", "4 files: 2 failed, 1 warned, 1 passed."]
     rows = [line for line in lines if line.startswith("| ")][2:]
@@ -138,7 +136,7 @@ def test_markdown_is_a_table_that_no_name_leaves(reports: list[FileReport]) -> N
     assert len(row) < 800
 
 
-def test_markdown_of_many_findings_fits_a_summary() -> None:
+def test_markdown_of_many_findings_fits_a_summary():
     many = [FileReport(f"{'x' * 400}{i}.stl", (Finding("T001", "error", "y" * 4000),)) for i in range(2000)]
     many.append(FileReport("known.stl", (Finding("T001", "error", "z", known=True),)))
     said = render(many, "markdown")
@@ -146,11 +144,11 @@ def test_markdown_of_many_findings_fits_a_summary() -> None:
     assert "1,501 more findings are in the log." in said
 
 
-def test_github_says_of_a_clean_run_that_it_ran() -> None:
+def test_github_says_of_a_clean_run_that_it_ran():
     assert render([FileReport("::error::.stl")], "github") == "1 file: 1 passed\n"
 
 
-def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) -> None:
+def test_junit_failures_have_a_body_and_cases_a_time(reports):
     (report,) = check_files([(str(HERE / "nothing.stl"), Options())])
     assert report.seconds is not None
     assert report.seconds >= 0
@@ -169,7 +167,7 @@ def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) 
     assert lines[-1] == f"Fix: {rules()['T001'].fix}"
 
 
-def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) -> None:
+def test_every_format_says_how_to_fix_what_was_found(reports):
     for code in {found.code for report in reports for found in report.findings}:
         for format_ in FORMATS:
             strict = render(reports, format_, "warning")
@@ -183,12 +181,12 @@ def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) 
     assert "**Fix:**" in rule["help"]["markdown"]
 
 
-def test_text_says_what_a_file_that_passed_holds(reports: list[FileReport]) -> None:
+def test_text_says_what_a_file_that_passed_holds(reports):
     first = render(reports, "text").splitlines()[0]
     assert first == "good.stl: passed: 10 x 10 x 10 mm, 1000 mm3, 1 shell, 12 triangles"
 
 
-def test_sarif_names_objects_as_logical_locations() -> None:
+def test_sarif_names_objects_as_logical_locations():
     found = Finding("G001", "error", "x", 2, (Location(face=1, object="bolt"), Location(face=2, object="nut")))
     data = json.loads(render([FileReport("a.obj", (found,))], "sarif"))
     schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
@@ -197,7 +195,7 @@ def test_sarif_names_objects_as_logical_locations() -> None:
     assert [item["name"] for item in place["logicalLocations"]] == ["bolt", "nut"]
 
 
-def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
+def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region():
     places = (Location(line=7, part="3D/a.model"), Location(line=9))
     said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
     (result,) = json.loads(render([said], "sarif"))["runs"][0]["results"]
@@ -207,13 +205,13 @@ def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
     assert annotation.startswith("::error file=a.3mf,line=9,title=P017")
 
 
-def test_a_place_of_which_nothing_is_known_is_none(tmp_path: Path) -> None:
+def test_a_place_of_which_nothing_is_known_is_none(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box(), header=b"solid"))
     (found,) = check_file(tmp_path / "a.stl").as_dict()["findings"]
     assert (found["code"], found["locations"]) == ("F007", [])
 
 
-def test_a_location_names_every_face_the_object_and_the_line() -> None:
+def test_a_location_names_every_face_the_object_and_the_line():
     assert Location(face=3) == Location(faces=(3,))
     both = Location(faces=(3, 17), xyz=(1.0, -0.0, 2.5), line=12, object="bolt")
     assert both.as_dict() == {"object": "bolt", "face": 3, "faces": [3, 17], "xyz": [1.0, 0.0, 2.5], "line": 12}
@@ -221,7 +219,7 @@ def test_a_location_names_every_face_the_object_and_the_line() -> None:
     assert str(Location(face=3, part="object 2", object="object 2")) == "object 2 face 3"
 
 
-def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
+def test_both_faces_of_a_crossing_are_named_in_every_format():
     first = box()
     report = check_mesh(np.concatenate([first, box((4, 4, 4), (8, 3, 3))]).reshape(-1, 3), np.arange(72).reshape(-1, 3))
     crossing = finding(report, "G001")
@@ -239,7 +237,7 @@ def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
             ]
 
 
-def test_line_and_object_of_a_face_come_from_its_mesh() -> None:
+def test_line_and_object_of_a_face_come_from_its_mesh():
     points = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]], float)
     mesh = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]), source=Source(
         lines=np.array([7, 8, 11]), starts=np.array([0, 1, 2]), names=b"bolt\nnut\n"))  # fmt: skip
@@ -252,13 +250,11 @@ def test_line_and_object_of_a_face_come_from_its_mesh() -> None:
     assert (two.locations[0].line, two.locations[0].object) == (8, "nut and bolt")
 
 
-def test_fingerprints_are_those_of_the_file_however_it_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fingerprints_are_those_of_the_file_however_it_is_named(tmp_path, monkeypatch):
     (tmp_path / "sub").mkdir()
     monkeypatch.chdir(tmp_path)
 
-    def print_of(path: str) -> str:
+    def print_of(path):
         data = json.loads(render([FileReport(path, (Finding("T001", "error", "x"),))], "sarif"))
         return data["runs"][0]["results"][0]["partialFingerprints"]["pathAndRule/v1"]
 
@@ -268,7 +264,7 @@ def test_fingerprints_are_those_of_the_file_however_it_is_named(
     assert print_of(str(tmp_path) + "2/a.stl") != print_of("2/a.stl")
 
 
-def test_explain_takes_commas_and_prefixes() -> None:
+def test_explain_takes_commas_and_prefixes():
     said = explain("t001, G001")
     assert [line[:4] for line in said.splitlines() if line[:4] in rules()] == ["T001", "G001"]
     family = explain("V")
@@ -279,7 +275,7 @@ def test_explain_takes_commas_and_prefixes() -> None:
             explain(wrong)
 
 
-def test_an_unknown_code_names_one_nearest_at_most() -> None:
+def test_an_unknown_code_names_one_nearest_at_most():
     with pytest.raises(
         Refusal,
         match=r"^--explain = 'T0001': unknown code; unitcad check --list-rules lists all; nearest accepted: 'T00\d'$",
@@ -290,12 +286,12 @@ def test_an_unknown_code_names_one_nearest_at_most() -> None:
 
 
 @pytest.mark.parametrize("format_", FORMATS)
-def test_every_format_survives_odd_names(format_: str) -> None:
+def test_every_format_survives_odd_names(format_):
     odd = FileReport("\udce4 \x00 <&>\"'.stl", (Finding("T001", "error", "x \ud800 \x01"),))
     assert render([odd], format_)
 
 
-def test_merge_adds_counts_and_keeps_the_worst() -> None:
+def test_merge_adds_counts_and_keeps_the_worst():
     one = Finding("P017", "warning", "a", 2, tuple(Location(face=i) for i in range(4)))
     two = Finding("P017", "error", "b", 3, tuple(Location(face=i) for i in range(4, 9)))
     (merged,) = merge([one, two])
@@ -304,7 +300,7 @@ def test_merge_adds_counts_and_keeps_the_worst() -> None:
     assert merge([one])[0].message == "a"
 
 
-def test_statistics_count_files_and_findings() -> None:
+def test_statistics_count_files_and_findings():
     once = FileReport("a.stl", (Finding("T001", "error", "x", 2), Finding("T004", "warning", "y")))
     lines = output.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
     assert [line.split() for line in lines] == [
@@ -314,7 +310,7 @@ def test_statistics_count_files_and_findings() -> None:
     assert lines[0].index("T001") == lines[1].index("T004")
 
 
-def test_rules_are_whole() -> None:
+def test_rules_are_whole():
     for code, rule in rules().items():
         assert rule.severity in SEVERITIES
         assert code[0] in FAMILIES
@@ -327,11 +323,11 @@ def test_rules_are_whole() -> None:
         assert rule.example in explain(code)
 
 
-def test_select_and_ignore_by_longest_prefix(tmp_path: Path) -> None:
+def test_select_and_ignore_by_longest_prefix(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(box()[2:], header=b"solid", normals=np.tile([0.0, 0.0, 1.0], (10, 1))))
 
-    def codes(**given: tuple[str, ...]) -> list[str]:
+    def codes(**given):
         return [found.code for found in check_file(path, Options(**given)).findings]
 
     assert codes() == ["T001", "F007", "T013"]

@@ -1,20 +1,15 @@
 """GLB: the scene's triangles in mm, z up, each node in its place; and what cannot be read is refused by name."""
 
-from __future__ import annotations
-
 import copy
 import io
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from glb_files import packed, scene
-from shapes import CUBE_CORNERS, CUBE_FACES, Judge, finding
+from shapes import CUBE_CORNERS, CUBE_FACES, finding
 
 from unitcad.export import glb
-from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.readers import reader_of
 from unitcad.meshcheck.rules.f_file import Deadline, Limits
 
@@ -22,27 +17,27 @@ CUBE = (CUBE_CORNERS * 0.01).astype("<f4")  # metres
 FACES = CUBE_FACES.astype("<u2")
 
 
-def in_mm(corners: np.ndarray) -> np.ndarray:
+def in_mm(corners):
     """Metres with y up as mm with z up."""
     return np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1) * 1000
 
 
-def soup(content: bytes) -> np.ndarray:
-    findings: list[Finding] = []
+def soup(content):
+    findings = []
     mesh = reader_of("glb")(memoryview(content), Limits(), Deadline(60), findings)
     assert findings == []
     assert mesh is not None
     return mesh.vertices[mesh.faces]
 
 
-def test_metres_with_y_up_become_millimetres_with_z_up(judge: Judge) -> None:
+def test_metres_with_y_up_become_millimetres_with_z_up(judge):
     report = judge(packed(*scene(CUBE * np.array([1, 2, 3], "<f4"), FACES)), "a.glb", printer="fdm-0.4")
     assert report.findings == ()
     np.testing.assert_allclose(report.facts.bbox_mm, ((0, -30, 0), (10, 0, 20)), atol=1e-5)
     assert report.facts.volume_mm3 == pytest.approx(6000, rel=1e-6)
 
 
-def test_a_unit_that_is_named_takes_the_place_of_the_metre(judge: Judge) -> None:
+def test_a_unit_that_is_named_takes_the_place_of_the_metre(judge):
     content = packed(*scene((CUBE_CORNERS * 10).astype("<f4"), FACES))
     (found,) = judge(content, "a.glb").findings
     assert (found.code, "10 mm if the numbers are millimetres" in found.message) == ("S001", True)
@@ -51,7 +46,7 @@ def test_a_unit_that_is_named_takes_the_place_of_the_metre(judge: Judge) -> None
     assert report.facts.volume_mm3 == pytest.approx(1000, rel=1e-12)
 
 
-def test_our_own_files_come_back_to_the_last_bit() -> None:
+def test_our_own_files_come_back_to_the_last_bit():
     vertices = (CUBE_CORNERS * [12.3, 4.56, 78.9] + [1.1, 2.2, 3.3]).astype(np.float32)
     content = glb.content([glb.GlbPart("a", (1, 1, 1), vertices.astype(float), CUBE_FACES)])
     np.testing.assert_array_equal(np.unique(soup(content).reshape(-1, 3), axis=0), np.unique(vertices, axis=0))
@@ -66,7 +61,7 @@ NODES = [
 ]  # fmt: skip
 
 
-def test_nodes_place_their_meshes_as_trimesh_has_them(judge: Judge) -> None:
+def test_nodes_place_their_meshes_as_trimesh_has_them(judge):
     content = packed(*scene(CUBE, FACES, NODES))
     theirs = trimesh.load(io.BytesIO(content), file_type="glb", process=False)
     assert isinstance(theirs, trimesh.Scene)
@@ -82,7 +77,7 @@ def test_nodes_place_their_meshes_as_trimesh_has_them(judge: Judge) -> None:
     assert not report.has("T008")
 
 
-def test_faces_are_named_by_their_node(judge: Judge) -> None:
+def test_faces_are_named_by_their_node(judge):
     content = packed(*scene(CUBE, FACES[:-1], NODES))
     hole = finding(judge(content, "a.glb"), "T001")
     assert {place.object for place in hole.locations} <= {"turned", "mirrored", "node 3"}
@@ -90,13 +85,13 @@ def test_faces_are_named_by_their_node(judge: Judge) -> None:
 
 
 @pytest.mark.parametrize(("deep", "codes"), [(2e-6, []), (0.01, ["G002"])])
-def test_objects_that_cross_by_rounding_only_touch(deep: float, codes: list[str], judge: Judge) -> None:
+def test_objects_that_cross_by_rounding_only_touch(deep, codes, judge):
     cubes = {"a": CUBE_CORNERS * 10.0, "b": CUBE_CORNERS * 10.0 + [10 - deep, 1 / 3, 1 / 3]}
     content = glb.content([glb.GlbPart(name, (1, 1, 1), corners, CUBE_FACES) for name, corners in cubes.items()])
     assert [found.code for found in judge(content, "a.glb").findings] == codes
 
 
-def test_strips_and_fans_and_lists_without_indices() -> None:
+def test_strips_and_fans_and_lists_without_indices():
     strip = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]], "<f4")
     for mode, rows in ((5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]), (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0]])):
         for corners in (None, np.arange(5, dtype="<u1")):
@@ -105,7 +100,7 @@ def test_strips_and_fans_and_lists_without_indices() -> None:
     assert len(soup(packed(*scene(CUBE[CUBE_FACES.ravel()], None)))) == 12
 
 
-def test_interleaved_and_quantized_positions() -> None:
+def test_interleaved_and_quantized_positions():
     document, binary = scene(CUBE, FACES)
     rows = np.zeros((8, 6), "<f4")
     rows[:, 3:] = CUBE
@@ -121,7 +116,7 @@ def test_interleaved_and_quantized_positions() -> None:
     np.testing.assert_array_equal(soup(packed(document, binary)), soup(packed(*scene(CUBE, FACES))))
 
 
-def spoil(change: Callable[[dict[str, Any]], Any]) -> bytes:
+def spoil(change):
     document, binary = scene(CUBE, FACES)
     document = copy.deepcopy(document)
     change(document)
@@ -130,7 +125,7 @@ def spoil(change: Callable[[dict[str, Any]], Any]) -> bytes:
 
 HUGE = [{"scale": [1e29] * 3, "children": [1]}, {"mesh": 0, "scale": [1e29] * 3}]
 GOOD = packed(*scene(CUBE, FACES))
-BAD: list[tuple[str, bytes, str, str]] = [
+BAD  = [
     ("no glb", b"solid a\n" * 9, "F005", "no binary glTF"),
     ("short", GOOD[:16], "F001", "shorter than a GLB's header"),
     ("cut", GOOD[:-1], "F002", "the header promises"),
@@ -169,16 +164,16 @@ BAD: list[tuple[str, bytes, str, str]] = [
 
 
 @pytest.mark.parametrize(("content", "code", "said"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
-def test_what_is_wrong_is_named(content: bytes, code: str, said: str, judge: Judge) -> None:
+def test_what_is_wrong_is_named(content, code, said, judge):
     report = judge(content, "a.glb")
     assert [found.message for found in report.findings if found.code == code and said in found.message], report.findings
     assert report.verdict == ("warning" if code == "F006" else "error")
 
 
-def test_a_deep_tree_and_many_placings_are_bounded(judge: Judge) -> None:
+def test_a_deep_tree_and_many_placings_are_bounded(judge):
     chain = [{"children": [i + 1]} for i in range(80)]
     assert judge(packed(*scene(CUBE, FACES, [*chain, {"mesh": 0}])), "a.glb").has("P009")
-    crowd: list[dict[str, Any]] = [{"children": list(range(1, 400))}, *({"mesh": 0} for _ in range(399))]
+    crowd = [{"children": list(range(1, 400))}, *({"mesh": 0} for _ in range(399))]
     document, binary = scene(CUBE, FACES, crowd)
     document["meshes"][0]["primitives"] *= 300
     document["meshes"][0]["name"] = "a" * 100_000

@@ -1,7 +1,5 @@
 """The pre-commit hook and the GitHub Action, as data and by running what they run."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -23,7 +21,7 @@ needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's sc
 ROOT = Path(__file__).parent.parent.parent
 
 
-def _value(text: str, key: str) -> str:
+def _value(text, key):
     found = re.search(rf"(?m)^\s*{key}: (.+)$", text)
     assert found is not None
     return found.group(1)
@@ -33,13 +31,13 @@ def _value(text: str, key: str) -> str:
     ("a.stl", True), ("dir/b.STL", True), ("c.3mf", True), ("d.obj", True), ("e.ply", True), ("f.off", True),
     ("g.step", False), ("h.stl.txt", False), ("stl", False), ("i.object", False),
 ])  # fmt: skip
-def test_hook_takes_mesh_files_by_suffix(name: str, wanted: bool) -> None:
+def test_hook_takes_mesh_files_by_suffix(name, wanted):
     hook = (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")
     assert bool(re.search(_value(hook, "files"), name)) == wanted
     assert _value(hook, "entry") == "unitcad check"
 
 
-def _scripts() -> list[str]:
+def _scripts():
     """The action's scripts: that of the step Install, that of the step Check."""
     text = (ROOT / "action.yml").read_text("utf-8")
     return [
@@ -48,7 +46,7 @@ def _scripts() -> list[str]:
     ]
 
 
-def _program(path: Path, words: str) -> None:
+def _program(path, words):
     """A program at `path` that writes its arguments down in a file beside the folder, then runs `words`."""
     path.parent.mkdir(exist_ok=True)
     path.write_text(
@@ -57,11 +55,11 @@ def _program(path: Path, words: str) -> None:
     path.chmod(0o755)
 
 
-def _calls(folder: Path) -> list[str]:
+def _calls(folder):
     return (folder / "calls").read_text("utf-8").splitlines()
 
 
-def _run_action(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
+def _run_action(folder, **given):
     """The action's last script as a runner starts it, with a `unitcad` on the path that is this one."""
     text = (ROOT / "action.yml").read_text("utf-8")
     script = folder / "step.sh"
@@ -88,7 +86,7 @@ def _run_action(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
     ("files", "code", "sarif"),
     [("good.stl", 0, "out.sarif"), ("bad.stl\ngood.stl", 1, "deep/er/out.sarif"), ("*.stl", 1, "")],
 )
-def test_the_action_reports_and_fails_on_findings(files: str, code: int, sarif: str, tmp_path: Path) -> None:
+def test_the_action_reports_and_fails_on_findings(files, code, sarif, tmp_path):
     done = _run_action(tmp_path, FILES=files, SARIF=sarif)
     assert done.returncode == code, done.stderr
     assert ("::error file=bad.stl" in done.stdout) == bool(code)
@@ -107,7 +105,7 @@ def test_the_action_reports_and_fails_on_findings(files: str, code: int, sarif: 
     [({"FAIL_ON": "never"}, "--fail-on"), ({"FILES": " "}, "is required"), ({"PRINTER": "none-such"}, "--printer"),
      ({"ARGUMENTS": "--no-such-option"}, "--no-such-option")],
 )  # fmt: skip
-def test_the_action_fails_on_wrong_inputs_and_says_so(given: dict[str, str], said: str, tmp_path: Path) -> None:
+def test_the_action_fails_on_wrong_inputs_and_says_so(given, said, tmp_path):
     done = _run_action(tmp_path, **given, SARIF="out.sarif")
     assert done.returncode == 2
     assert said in done.stderr
@@ -118,7 +116,7 @@ def test_the_action_fails_on_wrong_inputs_and_says_so(given: dict[str, str], sai
 @pytest.mark.parametrize("names", [
     "my parts", "  my parts/bad one.stl  \r\n good.stl", "my parts/**/bad*.stl", "good.stl my*/bad*.stl",
 ])  # fmt: skip
-def test_the_action_takes_names_with_blanks(names: str, tmp_path: Path) -> None:
+def test_the_action_takes_names_with_blanks(names, tmp_path):
     (tmp_path / "work/my parts/deep er").mkdir(parents=True)
     for name in ("bad one.stl", "deep er/bad two.stl"):
         (tmp_path / "work/my parts" / name).write_bytes(stl(box()[2:]))
@@ -130,7 +128,7 @@ def test_the_action_takes_names_with_blanks(names: str, tmp_path: Path) -> None:
 
 
 @needs_bash
-def test_the_action_takes_arguments_in_quotes_and_none_as_a_pattern(tmp_path: Path) -> None:
+def test_the_action_takes_arguments_in_quotes_and_none_as_a_pattern(tmp_path):
     (tmp_path / "work").mkdir()
     (tmp_path / "work/my settings.toml").write_text("[check]\nignore = ['T001']\n")
     given = "--config 'my settings.toml'\n--jobs \"1\""
@@ -144,13 +142,13 @@ def test_the_action_takes_arguments_in_quotes_and_none_as_a_pattern(tmp_path: Pa
 
 
 @needs_bash
-def test_the_action_leaves_the_summary_out(tmp_path: Path) -> None:
+def test_the_action_leaves_the_summary_out(tmp_path):
     assert _run_action(tmp_path, FILES="bad.stl", SUMMARY="false").returncode == 1
     assert not (tmp_path / "summary.md").exists()
 
 
 @needs_bash
-def test_a_wrong_command_leaves_no_report_of_an_earlier_run(tmp_path: Path) -> None:
+def test_a_wrong_command_leaves_no_report_of_an_earlier_run(tmp_path):
     assert _run_action(tmp_path, FILES="bad.stl", SARIF="out.sarif").returncode == 1
     assert (tmp_path / "work/out.sarif").exists()
     assert _run_action(tmp_path, FAIL_ON="never", SARIF="out.sarif").returncode == 2
@@ -159,9 +157,7 @@ def test_a_wrong_command_leaves_no_report_of_an_earlier_run(tmp_path: Path) -> N
 
 @needs_bash
 @pytest.mark.parametrize(("step", "code", "wanted"), [("true", 0, "[step]"), ("false", 0, ""), ("yes", 2, None)])
-def test_the_action_installs_the_step_kernel_on_demand(
-    step: str, code: int, wanted: str | None, tmp_path: Path
-) -> None:
+def test_the_action_installs_the_step_kernel_on_demand(step, code, wanted, tmp_path):
     _program(tmp_path / "bin/python", "")
     environment = {
         **os.environ,
@@ -183,7 +179,7 @@ def test_the_action_installs_the_step_kernel_on_demand(
 
 @needs_bash
 @pytest.mark.parametrize(("fail_on", "code"), [("", 1), ("error", 0)])
-def test_the_action_takes_the_checkouts_settings(fail_on: str, code: int, tmp_path: Path) -> None:
+def test_the_action_takes_the_checkouts_settings(fail_on, code, tmp_path):
     (tmp_path / "work").mkdir()
     (tmp_path / "work/warn.stl").write_bytes(stl(box(), header=b"solid"))
     (tmp_path / "work/unitcad.toml").write_text("[check]\nfail-on = 'warning'\n")
@@ -191,7 +187,7 @@ def test_the_action_takes_the_checkouts_settings(fail_on: str, code: int, tmp_pa
     assert done.returncode == code, done.stderr
 
 
-def test_the_settings_on_the_page_are_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_settings_on_the_page_are_settings(tmp_path, monkeypatch):
     page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     monkeypatch.chdir(tmp_path)
     shown = re.findall(r"```toml\n# (\S+)\n(.*?)```", page, re.DOTALL)
@@ -208,13 +204,13 @@ def test_the_settings_on_the_page_are_settings(tmp_path: Path, monkeypatch: pyte
             assert run("part.stl", cwd=tmp_path).returncode == 0
 
 
-def test_the_actions_inputs_are_not_pasted_into_its_script() -> None:
+def test_the_actions_inputs_are_not_pasted_into_its_script():
     """An input inside `run:` would let a pull request's text become a command."""
     assert (ROOT / "action.yml").read_text("utf-8").count("run:") == len(_scripts()) == 2
     assert not any("${{" in script for script in _scripts())
 
 
-def test_the_page_on_ci_names_what_there_is() -> None:
+def test_the_page_on_ci_names_what_there_is():
     """Its snippets use the hook's id, every input of the action and no other, and options of the command only."""
     page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     action = (ROOT / "action.yml").read_text("utf-8")
@@ -226,7 +222,7 @@ def test_the_page_on_ci_names_what_there_is() -> None:
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page)) <= known
 
 
-def test_the_page_on_ci_shows_the_json_that_is_written(judge) -> None:
+def test_the_page_on_ci_shows_the_json_that_is_written(judge):
     page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     shown = json.loads(page[page.index("```json\n") + 8 : page.index("```\n", page.index("```json"))])
     content = re.search(r"open\('open.obj', 'w'\).write\('(.*)'\)", page)

@@ -1,7 +1,5 @@
 """Hostile and damaged input: never anything but a verdict, within bounds."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -13,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shapes import ROOT_RELS, TYPES, Judge, box, model_xml, package, stl
+from shapes import ROOT_RELS, TYPES, box, model_xml, package, stl
 
 from unitcad.meshcheck import Options, check_file, check_mesh
 from unitcad.meshcheck.file_checks import check_files, check_guarded
@@ -21,7 +19,7 @@ from unitcad.meshcheck.file_checks import check_files, check_guarded
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(max_size=300), suffix=st.sampled_from([".stl", ".3mf", ".obj", ".ply", ".off", ".step"]))
-def test_any_bytes_are_an_error_or_a_mesh(data: bytes, suffix: str, tmp_path: Path) -> None:
+def test_any_bytes_are_an_error_or_a_mesh(data, suffix, tmp_path):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(data)
     report = check_file(path)
@@ -33,14 +31,14 @@ def test_any_bytes_are_an_error_or_a_mesh(data: bytes, suffix: str, tmp_path: Pa
     st.lists(st.tuples(*[st.integers(-2, 2)] * 3), min_size=3, max_size=8),
     st.lists(st.tuples(*[st.integers(0, 7)] * 3), min_size=1, max_size=12),
 )
-def test_any_little_mesh_has_a_verdict(points: list, faces: list) -> None:
+def test_any_little_mesh_has_a_verdict(points, faces):
     faces = [[i % len(points) for i in face] for face in faces]
     report = check_mesh(np.array(points, float), np.array(faces))
     assert report.verdict in ("pass", "warning", "error")
     assert not report.has("F011")
 
 
-def test_a_bomb_is_refused_before_it_is_inflated(tmp_path: Path) -> None:
+def test_a_bomb_is_refused_before_it_is_inflated(tmp_path):
     path = tmp_path / "bomb.3mf"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("[Content_Types].xml", TYPES)
@@ -63,18 +61,18 @@ def test_a_bomb_is_refused_before_it_is_inflated(tmp_path: Path) -> None:
     ],
     ids=["bytes", "entries"],
 )
-def test_a_packages_bounds(content: bytes, bounds: dict[str, int], judge: Judge) -> None:
+def test_a_packages_bounds(content, bounds, judge):
     assert judge(content, "a.3mf", **bounds).has("F011")
 
 
-def test_a_wrong_size_in_the_directory_is_no_way_round(judge: Judge) -> None:
+def test_a_wrong_size_in_the_directory_is_no_way_round(judge):
     data = bytearray(package())
     at = data.rindex(b"PK\x01\x02")
     data[at + 24 : at + 28] = (10).to_bytes(4, "little")  # the model's inflated size in the directory
     assert judge(bytes(data), "a.3mf").verdict == "error"
 
 
-def test_memory_limit_is_a_finding(tmp_path: Path) -> None:
+def test_memory_limit_is_a_finding(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(np.tile(box(), (60_000, 1, 1)) + np.arange(720_000)[:, None, None] // 12 * 0.001))
     code = (
@@ -87,7 +85,7 @@ def test_memory_limit_is_a_finding(tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
 
 
-def test_a_worker_that_dies_names_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_dies_names_its_file(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     import dying
 
@@ -98,7 +96,7 @@ def test_a_worker_that_dies_names_its_file(tmp_path: Path, monkeypatch: pytest.M
     assert [report.has("F011") for report in reports] == [False, True, False]
 
 
-def test_inner_fault_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_inner_fault_is_a_finding(tmp_path, monkeypatch):
     monkeypatch.setattr("unitcad.meshcheck.file_checks.check_file", lambda *_: 1 / 0)
     report = check_guarded(str(tmp_path / "a.stl"), Options())
     assert report.has("F011")
@@ -106,7 +104,7 @@ def test_inner_fault_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may read everything")
-def test_a_file_that_may_not_be_read(tmp_path: Path) -> None:
+def test_a_file_that_may_not_be_read(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(box()))
     path.chmod(0)

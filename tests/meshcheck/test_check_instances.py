@@ -1,23 +1,21 @@
 """Builds of many instances: facts are those of the meshes placed one by one, within bounds on time and number."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
 import pytest
-from shapes import CUBE_CORNERS, CUBE_FACES, Judge, finding, mesh_xml, model_xml, package
+from shapes import CUBE_CORNERS, CUBE_FACES, finding, mesh_xml, model_xml, package
 
 from unitcad.meshcheck import Limits, Options, check_bytes
 
 
-def build(matrices: list[np.ndarray]) -> str:
+def build(matrices):
     rows = (" ".join(f"{value:.17g}" for value in matrix.ravel()) for matrix in matrices)
     items = "".join(f'<item objectid="1" transform="{row}"/>' for row in rows)
     return f"<build>{items}</build>"
 
 
-def test_facts_are_those_of_the_meshes_placed_one_by_one(judge: Judge) -> None:
+def test_facts_are_those_of_the_meshes_placed_one_by_one(judge):
     rng = np.random.default_rng(5)
     linear = [np.eye(3), np.diag([2.0, 1.0, 0.5]), np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=(3, 3))]
     matrices = [np.vstack([linear[i % 4], [40.0 * i, rng.normal(), -40.0 * i]]) for i in range(40)]
@@ -32,7 +30,7 @@ def test_facts_are_those_of_the_meshes_placed_one_by_one(judge: Judge) -> None:
     assert facts.triangles == 480
 
 
-def test_every_instance_that_is_too_far_or_mirrors_is_said(judge: Judge) -> None:
+def test_every_instance_that_is_too_far_or_mirrors_is_said(judge):
     shift = [np.vstack([np.eye(3), [x, 0, 0]]) for x in (0, 1e6, 20, 2e6)]
     report = judge(package(model_xml(build=build(shift))), "a.3mf")
     assert finding(report, "V002").count == 2
@@ -41,7 +39,7 @@ def test_every_instance_that_is_too_far_or_mirrors_is_said(judge: Judge) -> None
     assert finding(report, "P015").count == 3
 
 
-def test_many_instances_of_one_object_are_cheap(judge: Judge) -> None:
+def test_many_instances_of_one_object_are_cheap(judge):
     eye = np.eye(3)
     spread = [np.vstack([eye, [20.0 * (i % 100), 20.0 * (i // 100), 0]]) for i in range(20_000)]
     content = package(model_xml(build=build(spread)))
@@ -52,7 +50,7 @@ def test_many_instances_of_one_object_are_cheap(judge: Judge) -> None:
 
 
 @pytest.mark.parametrize("items", [1001, 600])
-def test_instances_beyond_the_limit_end_the_check(items: int) -> None:
+def test_instances_beyond_the_limit_end_the_check(items):
     """Counted as they are read (1001 items), or once expanded (600 items of an object with one component)."""
     whole = '<object id="1"><components><component objectid="2"/></components></object>'
     build = "<build>" + '<item objectid="1"/>' * items + "</build>"
@@ -64,7 +62,7 @@ def test_instances_beyond_the_limit_end_the_check(items: int) -> None:
     assert Limits().max_instances == 100_000
 
 
-def test_a_huge_expansion_is_said_in_few_digits(judge: Judge) -> None:
+def test_a_huge_expansion_is_said_in_few_digits(judge):
     rows = "".join(
         f'<object id="{i}"><components>' + f'<component objectid="{i - 1}"/>' * 100 + "</components></object>"
         for i in range(2, 60)
@@ -74,7 +72,7 @@ def test_a_huge_expansion_is_said_in_few_digits(judge: Judge) -> None:
     assert said == "more than 1e117 faces in more than 1e116 instances, more than --max-faces 10000000"
 
 
-def test_depth_is_counted_over_what_was_visited_before(judge: Judge) -> None:
+def test_depth_is_counted_over_what_was_visited_before(judge):
     chain = "".join(
         f'<object id="{i}"><components><component objectid="{i - 1}"/></components></object>' for i in range(2, 82)
     )
@@ -85,16 +83,14 @@ def test_depth_is_counted_over_what_was_visited_before(judge: Judge) -> None:
         assert [found.code for found in report.findings] == ([code] if code else []), items
 
 
-def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_place_on_the_bed(
-    judge: Judge, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_place_on_the_bed(judge, monkeypatch):
     from unitcad.meshcheck import builds
 
     thin = mesh_xml(CUBE_CORNERS * [20, 0.2, 20])
     turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     matrices = [np.vstack([linear, [20.0 * k, 5.0 * k, 0]]) for k in range(4) for linear in (np.eye(3), turn)]
 
-    def findings(of: list[np.ndarray]) -> dict:
+    def findings(of):
         content = package(model_xml(f'<object id="1">{thin}</object>', build=build(of)))
         return {
             item.code: item

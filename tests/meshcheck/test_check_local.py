@@ -1,7 +1,5 @@
 """Tolerances belong to a shell and its edges: what else is in the file has no say, nor do scale, place and attitude."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,25 +14,25 @@ from unitcad.meshcheck.rules.registry import explain
 BEAM = box((30_000, 10, 10), (0, 5, 0))
 
 
-def codes(report) -> set[str]:
+def codes(report):
     return {found.code for found in report.findings} - {"S001"}
 
 
-def _noisy(gap: float, size: float = 10.0) -> np.ndarray:
+def _noisy(gap, size=10.0):
     """A cube of which one triangle lies `gap` (part of the size, each way) off its place."""
     cube = box((size, size, size))
     cube[0] += gap * size
     return cube
 
 
-def _sheet() -> np.ndarray:
+def _sheet():
     """A flat tetrahedron: closed, without thickness."""
     a, b, c, d = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [3, 3, 0]], float)
     return np.array([[a, b, d], [b, c, d], [c, a, d], [a, c, b]])
 
 
 @pytest.mark.parametrize("width", [0.2, 0.002])
-def test_a_slit_is_no_seam_whatever_lies_beside_it(width: float) -> None:
+def test_a_slit_is_no_seam_whatever_lies_beside_it(width):
     """A box of 50 mm with a strip of its top missing: wider than 1e-5 of the box's diagonal of 87 mm."""
     left, right = 25 - width / 2, 25 + width / 2
     x = [0, left, right, 50]
@@ -60,7 +58,7 @@ def test_a_slit_is_no_seam_whatever_lies_beside_it(width: float) -> None:
 @pytest.mark.parametrize(("gap", "closes"), [(0.9e-5, True), (1.1e-5, False)])
 @pytest.mark.parametrize("company", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 0.02, 300.0])
-def test_the_weld_reaches_as_far_as_the_rule_says(gap: float, closes: bool, company: bool, scale: float) -> None:
+def test_the_weld_reaches_as_far_as_the_rule_says(gap, closes, company, scale):
     assert "1e-5 of their own shell's diagonal" in explain("T006")
     soup = _noisy(gap) * scale
     if company:
@@ -71,7 +69,7 @@ def test_the_weld_reaches_as_far_as_the_rule_says(gap: float, closes: bool, comp
 
 
 @pytest.mark.parametrize(("gap", "closes"), [(0.09, True), (0.11, False)])
-def test_the_weld_reaches_no_farther_than_a_tenth_of_the_shortest_edge(gap: float, closes: bool) -> None:
+def test_the_weld_reaches_no_farther_than_a_tenth_of_the_shortest_edge(gap, closes):
     """A pyramid of a millimetre on a plate of 30 m (1e-5 of it is 0.4 mm), one of its sides off its place."""
     assert "a tenth of the shortest edge" in explain("T006")
     low, high = 0.0, 3e4
@@ -93,7 +91,7 @@ def test_the_weld_reaches_no_farther_than_a_tenth_of_the_shortest_edge(gap: floa
     assert report.has("T001") == (not closes)
 
 
-def test_normals_are_those_of_the_faces_as_stored() -> None:
+def test_normals_are_those_of_the_faces_as_stored():
     """Beside a part of 300 mm a weld by the file's size would move a corner of the small cube far."""
     soup = np.concatenate([_noisy(0.24, 0.012), box((300, 300, 300), (20, 20, 20))])
     for some in (soup, soup[:12], _noisy(5e-6)):
@@ -106,7 +104,7 @@ def test_normals_are_those_of_the_faces_as_stored() -> None:
 
 
 @pytest.mark.parametrize(("shift", "crosses"), [(5e-5, True), (-5e-5, False)])
-def test_crossings_are_those_of_the_faces_as_stored(shift: float, crosses: bool) -> None:
+def test_crossings_are_those_of_the_faces_as_stored(shift, crosses):
     """A side of a cube pushed in by less than the tolerance passes through the top, pulled out it does not."""
     soup = box()
     soup[0] += [shift, 0, 5e-5]
@@ -116,7 +114,7 @@ def test_crossings_are_those_of_the_faces_as_stored(shift: float, crosses: bool)
     assert report.facts.volume_mm3 == pytest.approx(1000, rel=1e-4)
 
 
-def test_a_vertex_that_no_face_uses_has_no_part_in_the_size() -> None:
+def test_a_vertex_that_no_face_uses_has_no_part_in_the_size():
     """At 30 km it would let a missing face of the cube pass, and take a cube for a sheet."""
     points = np.concatenate([CUBE_CORNERS * 10, [[3e7, 0, 0]]])
     assert codes(check_mesh(points, CUBE_FACES)) == {"T012"}
@@ -128,7 +126,7 @@ def test_a_vertex_that_no_face_uses_has_no_part_in_the_size() -> None:
     [(with_sliver(), "T011"), (_sheet(), "G007"), (box(at=(25_000, 0, 100)), "V002")],
     ids=["sliver", "sheet", "far"],
 )
-def test_small_shells_are_judged_by_their_own_size(part: np.ndarray, code: str, judge) -> None:
+def test_small_shells_are_judged_by_their_own_size(part, code, judge):
     alone = codes(judge(stl(part)))
     report = judge(stl(np.concatenate([part, BEAM - [0, 0, 50]])))
     assert code in alone
@@ -162,7 +160,7 @@ PARTS = {
     scale=st.sampled_from([0.02, 1.0, 3.7, 500.0]),
     seed=st.integers(0, 99),
 )
-def test_two_parts_far_apart_have_the_findings_of_each(one: str, other: str, scale: float, seed: int) -> None:
+def test_two_parts_far_apart_have_the_findings_of_each(one, other, scale, seed):
     """In double precision, the second part scaled and turned; both stay as they are when they are judged together."""
     first, second = PARTS[one] + 0.0, turned(PARTS[other], seed, scale)
     second += [50 - second[:, :, 0].min(), 0, 0]
@@ -177,7 +175,7 @@ def test_two_parts_far_apart_have_the_findings_of_each(one: str, other: str, sca
     scale=st.sampled_from([0.15, 1.0, 3.7, 90.0]),
     mirror=st.booleans(),
 )
-def test_scale_place_attitude_and_mirror_do_not_matter(part: str, seed: int, scale: float, mirror: bool) -> None:
+def test_scale_place_attitude_and_mirror_do_not_matter(part, seed, scale, mirror):
     """As float32; a shift of up to five sizes leaves the grid fine enough for each of these defects."""
     moved = turned(PARTS[part], seed, scale, 50 * scale, mirror)
     plain = codes(check_bytes(stl(PARTS[part]), "a.stl"))

@@ -1,12 +1,10 @@
 """Every malformed file gives its code; every rule has a file that breaks it and one that keeps it."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
 import pytest
-from malformed import Case, cases, options
+from malformed import cases, options
 from malformed_files import good_text_meshes
 from shapes import box, finding, model_xml, package, prism, stl, text_stl
 
@@ -21,7 +19,7 @@ ONE_OF_MANY = re.compile(r"(?<!object )(?<![\d.])1 (?:\w+ )?(?:\w+[^s\W]s|vertic
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
-def test_malformed_file_gives_its_code(case: Case, judge) -> None:
+def test_malformed_file_gives_its_code(case, judge):
     report = judge(case.data(), case.name, strict_3mf=True, **case.options)
     assert report.has(case.code), [found.code for found in report.findings]
     severity = finding(report, case.code).severity
@@ -36,12 +34,12 @@ def test_malformed_file_gives_its_code(case: Case, judge) -> None:
         assert not ONE_OF_MANY.search(found.message), found.message
 
 
-def test_there_are_eighty_and_names_differ() -> None:
+def test_there_are_eighty_and_names_differ():
     assert len(CASES) >= 80
     assert len({case.name for case in CASES}) == len(CASES)
 
 
-def test_every_rule_has_a_failing_file() -> None:
+def test_every_rule_has_a_failing_file():
     assert {case.code for case in CASES} | ELSEWHERE == set(rules())
 
 
@@ -60,14 +58,14 @@ def test_every_rule_has_a_failing_file() -> None:
         *good_text_meshes(),
     ],
 )
-def test_good_file_passes_every_rule(name: str, content: bytes | str, judge) -> None:
+def test_good_file_passes_every_rule(name, content, judge):
     report = judge(content, name, printer="fdm-0.4")
     assert report.findings == ()
     assert report.verdict == "pass"
     assert report.facts.watertight is True
 
 
-def test_facts_are_those_of_the_box(judge) -> None:
+def test_facts_are_those_of_the_box(judge):
     facts = judge(stl(box((10, 20, 30), (1, 2, 3)))).facts
     assert (facts.triangles, facts.vertices, facts.shells) == (12, 8, 1)
     assert facts.volume_mm3 == pytest.approx(6000, rel=1e-12)
@@ -75,7 +73,7 @@ def test_facts_are_those_of_the_box(judge) -> None:
     assert facts.bbox_mm == ((1, 2, 3), (11, 22, 33))
 
 
-def test_a_round_part_has_the_polygons_volume(judge) -> None:
+def test_a_round_part_has_the_polygons_volume(judge):
     n, r = 64, 5.0
     circle = [(r * np.cos(2 * np.pi * i / n), r * np.sin(2 * np.pi * i / n)) for i in range(n)]
     facts = judge(stl(prism(circle, 0, 7))).facts
@@ -83,12 +81,12 @@ def test_a_round_part_has_the_polygons_volume(judge) -> None:
 
 
 @pytest.mark.parametrize("cut", range(0, 684, 7))
-def test_a_binary_file_cut_anywhere_is_an_error(cut: int, judge) -> None:
+def test_a_binary_file_cut_anywhere_is_an_error(cut, judge):
     assert judge(stl(box())[:cut]).verdict == "error"
 
 
 @pytest.mark.parametrize("share", np.linspace(0, 0.985, 40))
-def test_a_package_cut_anywhere_is_an_error(share: float, judge) -> None:
+def test_a_package_cut_anywhere_is_an_error(share, judge):
     whole = package()
     assert judge(whole[: int(share * len(whole))], "part.3mf").verdict == "error"
 
@@ -96,28 +94,28 @@ def test_a_package_cut_anywhere_is_an_error(share: float, judge) -> None:
 @pytest.mark.parametrize(
     "transform", ["1 0 0 0 1 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 10 10 0", "0 1 0 -1 0 0 0 0 1 30 9 9"]
 )
-def test_instances_that_touch_or_stand_apart_share_nothing(transform: str, judge) -> None:
+def test_instances_that_touch_or_stand_apart_share_nothing(transform, judge):
     build = f'<build><item objectid="1"/><item objectid="1" transform="{transform}"/></build>'
     assert judge(package(model_xml(build=build)), "two.3mf").findings == ()
 
 
-def test_many_instances_that_share_are_counted(judge) -> None:
+def test_many_instances_that_share_are_counted(judge):
     places = "".join(f'<item objectid="1" transform="1 0 0 0 1 0 0 0 1 {9 * i} 0 0"/>' for i in range(40))
     (found,) = judge(package(model_xml(build=f"<build>{places}</build>")), "row.3mf").findings
     assert (found.code, found.severity, found.count) == ("G002", "warning", 39)
 
 
 @pytest.mark.parametrize("content", [stl(box()[2:], count=12), stl(box())[:-70], stl(box(), count=4_000_000_000)])
-def test_no_geometry_is_judged_where_facets_are_missing(content: bytes, judge) -> None:
+def test_no_geometry_is_judged_where_facets_are_missing(content, judge):
     assert [found.code for found in judge(content).findings] == ["F002"]
 
 
-def test_no_geometry_is_judged_of_numbers_that_are_none(judge) -> None:
+def test_no_geometry_is_judged_of_numbers_that_are_none(judge):
     report = judge(text_stl(box()).replace("vertex 10", "vertex 1_0"))
     assert [found.code for found in report.findings] == ["F004"]
 
 
-def test_counts_and_first_places(judge) -> None:
+def test_counts_and_first_places(judge):
     report = judge(stl(box()[2:]))
     hole = finding(report, "T001")
     assert hole.count == 4
@@ -126,7 +124,7 @@ def test_counts_and_first_places(judge) -> None:
 
 
 @pytest.mark.parametrize("case", CASES[::9], ids=[case.name for case in CASES[::9]])
-def test_bytes_are_judged_as_the_file_is(case: Case, judge) -> None:
+def test_bytes_are_judged_as_the_file_is(case, judge):
     of_file = judge(case.data(), case.name, **case.options)
     of_bytes = check_bytes(case.data(), case.name, options(**case.options))
     assert (of_bytes.findings, of_bytes.facts) == (of_file.findings, of_file.facts)
@@ -158,9 +156,7 @@ CUBE = text_stl(box())  # facet k (from 0) begins at line 2 + 7 k
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("block", [8_000_000, 500])
-def test_text_stl_is_blamed_where_it_breaks(
-    text: str, expected: list, block: int, judge, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_text_stl_is_blamed_where_it_breaks(text, expected, block, judge, monkeypatch):
     """The first word that breaks the grammar, and nothing of the mesh that came before it."""
     monkeypatch.setattr("unitcad.meshcheck.readers.read_stl._BLOCK", block)
     found = judge(text).findings

@@ -1,12 +1,9 @@
 """Files against a manifest: volume, solids, hash, missing files; tools get the printer's rules, other parts do not."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from shapes import box, stl
 import unitcad
 from unitcad.catalogue import printers
 from unitcad.errors import UnitcadError
-from unitcad.meshcheck import FileReport, Options
+from unitcad.meshcheck import Options
 from unitcad.meshcheck import manifest as listing
 from unitcad.meshcheck.file_checks import check_files
 
@@ -23,7 +20,7 @@ BASE = stl(box((20, 20, 5)))
 FILM = stl(box((20, 3, 0.11)))
 
 
-def written(folder: Path, **change: Any) -> Path:
+def written(folder, **change):
     (folder / "unit").mkdir()
     (folder / "base.stl").write_bytes(BASE)
     (folder / "unit" / "film.stl").write_bytes(FILM)
@@ -35,19 +32,19 @@ def written(folder: Path, **change: Any) -> Path:
     return folder
 
 
-def _part(name: str, role: str, path: str, content: bytes, volume: float) -> dict[str, Any]:
+def _part(name, role, path, content, volume):
     digest = hashlib.sha256(content).hexdigest()
     return {"name": name, "role": role, "volume_mm3": volume, "files": {"stl": {"path": path, "sha256": digest}}}
 
 
-def judged(folder: Path) -> dict[str, FileReport]:
+def judged(folder):
     listed = listing.read(str(folder))
     reports = list(check_files(listing.work(listed, [], lambda path: Options(), printers())))
     compared = [listing.compare(listed, report, Options()) for report in reports]
     return {Path(report.path).name: report for report in compared}
 
 
-def codes(report: FileReport) -> list[str]:
+def codes(report):
     return [found.code for found in report.findings]
 
 
@@ -65,16 +62,14 @@ TWO = stl(np.concatenate([box((20, 20, 5)), box((1, 1, 1), (40, 0, 0))]))
     ],
     ids=["good", "volume", "solids", "hash", "missing"],
 )
-def test_files_are_held_to_the_manifest_and_only_tools_to_the_printer(
-    tmp_path: Path, volume: float, content: bytes | None, found: list[str]
-) -> None:
+def test_files_are_held_to_the_manifest_and_only_tools_to_the_printer(tmp_path, volume, content, found):
     folder = written(tmp_path, volume_mm3=volume)
     (folder / "base.stl").unlink() if content is None else (folder / "base.stl").write_bytes(content)
     reports = judged(folder)
     assert {name: codes(report) for name, report in reports.items()} == {"base.stl": found, "film.stl": []}
 
 
-def test_m004_a_file_that_the_manifest_does_not_list(tmp_path: Path) -> None:
+def test_m004_a_file_that_the_manifest_does_not_list(tmp_path):
     folder = written(tmp_path)
     (folder / "other.stl").write_bytes(BASE)
     listed = listing.read(str(folder))
@@ -82,7 +77,7 @@ def test_m004_a_file_that_the_manifest_does_not_list(tmp_path: Path) -> None:
     assert codes(listing.compare(listed, report, Options())) == ["M004"]
 
 
-def test_a_tool_below_the_floor_is_warned_of(tmp_path: Path) -> None:
+def test_a_tool_below_the_floor_is_warned_of(tmp_path):
     folder = written(tmp_path)
     parts = json.loads((folder / "manifest.json").read_text())
     parts["parts"][1]["role"] = "tool"
@@ -99,9 +94,7 @@ OUTSIDE = [
 
 @pytest.mark.parametrize("path", OUTSIDE)
 @pytest.mark.parametrize("suffix", ["stl", "step"])
-def test_m005_nothing_outside_the_folder_is_read(
-    tmp_path: Path, path: str, suffix: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_m005_nothing_outside_the_folder_is_read(tmp_path, path, suffix, monkeypatch):
     folder = tmp_path / "build"
     folder.mkdir()
     written(folder)
@@ -113,7 +106,7 @@ def test_m005_nothing_outside_the_folder_is_read(
     listed = {"path": path.replace("{tmp}", str(tmp_path)), "sha256": "0" * 64}
     data["parts"].append({"name": "x", "role": "unit", "volume_mm3": 1.0, "files": {suffix: listed}})
     (folder / "manifest.json").write_text(json.dumps(data))
-    opened: list[str] = []
+    opened = []
     plain_open = Path.open
     monkeypatch.setattr(Path, "open", lambda self, *a, **k: opened.append(str(self)) or plain_open(self, *a, **k))
     plain_os_open = os.open
@@ -128,7 +121,7 @@ def test_m005_nothing_outside_the_folder_is_read(
     assert asked <= {"manifest.json", "base.stl", "film.stl"}
 
 
-def test_links_that_stay_inside_the_folder_are_followed(tmp_path: Path) -> None:
+def test_links_that_stay_inside_the_folder_are_followed(tmp_path):
     home = tmp_path / "home"
     home.mkdir()
     folder = written(home)
@@ -141,7 +134,7 @@ def test_links_that_stay_inside_the_folder_are_followed(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs")
-def test_a_manifest_that_is_no_regular_file_is_refused(tmp_path: Path) -> None:
+def test_a_manifest_that_is_no_regular_file_is_refused(tmp_path):
     os.mkfifo(tmp_path / "manifest.json")
     with pytest.raises(UnitcadError, match="not a regular file"):
         listing.read(str(tmp_path))

@@ -1,20 +1,17 @@
 """How numbers and names come out: no -0, no powers of ten where digits do, UTF-8 whatever a file is called."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from polygon_files import ply
-from shapes import CUBE_CORNERS, CUBE_FACES, Judge, box, mesh_xml, model_xml, package, stl
+from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, package, stl
 
 from unitcad.meshcheck.findings import Location, number
 
@@ -27,25 +24,25 @@ from unitcad.meshcheck.findings import Location, number
         (999999.5, 6, "1000000"), (0.0009999996, 6, "0.001"), (10.0, 6, "10"), (1e15, 6, "1e+15"), (3e38, 6, "3e+38"),
     ],
 )  # fmt: skip
-def test_numbers_in_messages(value: float, digits: int, expected: str) -> None:
+def test_numbers_in_messages(value, digits, expected):
     assert number(value, digits) == expected
 
 
 @given(st.floats(-1e14, 1e14))
-def test_numbers_are_within_their_digits(value: float) -> None:
+def test_numbers_are_within_their_digits(value):
     text = number(value)
     assert "e" not in text
     assert text != "-0"
     assert float(text) == pytest.approx(value, rel=5.1e-6, abs=1.1e-6)
 
 
-def test_places_hold_no_negative_zero() -> None:
+def test_places_hold_no_negative_zero():
     place = Location(xyz=(-0.0, 1e-9, -1e-17))
     assert str(place) == "(0, 0, 0)"
     assert json.dumps(place.as_dict()["xyz"])[:5] == "[0.0,"
 
 
-def test_no_volume_of_a_mesh_that_is_not_oriented(judge: Judge) -> None:
+def test_no_volume_of_a_mesh_that_is_not_oriented(judge):
     """Closed, but one face is turned over: what it encloses has no meaning."""
     turned = box()
     turned[0] = turned[0][::-1]
@@ -60,7 +57,7 @@ def test_no_volume_of_a_mesh_that_is_not_oriented(judge: Judge) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
 @pytest.mark.parametrize("format_", ["json", "github", "sarif", "junit"])
-def test_machine_formats_are_utf8_for_any_name(format_: str, tmp_path: Path) -> None:
+def test_machine_formats_are_utf8_for_any_name(format_, tmp_path):
     for name in (b"k\xe4se\xff\\.stl", "Käse.stl".encode(), b"line\nbreak.stl"):
         (tmp_path / os.fsdecode(name)).write_bytes(stl(box()[1:]))
     command = [sys.executable, "-m", "unitcad", "check", ".", "--output-format", format_]
@@ -83,7 +80,7 @@ def test_machine_formats_are_utf8_for_any_name(format_: str, tmp_path: Path) -> 
                 ]
 
 
-def test_numbers_that_float32_has_none_for_are_zero(judge: Judge) -> None:
+def test_numbers_that_float32_has_none_for_are_zero(judge):
     """Their products are beyond what doubles hold, too."""
     points = CUBE_CORNERS * 10
     points[points == 0] = 1e-312

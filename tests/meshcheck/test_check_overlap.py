@@ -1,7 +1,5 @@
 """A shell that overlaps itself (G008), and walls and gaps without thickness (G009)."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -18,11 +16,11 @@ from unitcad.meshcheck.rules.registry import rules
 OVERLAP = {"G002", "G008", "T008", "G009", "T009"}
 
 
-def codes(report) -> set[str]:
+def codes(report):
     return {found.code for found in report.findings} - {"S001"}
 
 
-def pentagram(peaks: bool) -> np.ndarray:
+def pentagram(peaks):
     """A prism over the star polygon {5/2}, 5 high; its walls share edges where they meet, so that no faces cross.
 
     Its middle pentagon is covered twice at top and bottom: by two fans, or by two pyramids of different height.
@@ -32,7 +30,7 @@ def pentagram(peaks: bool) -> np.ndarray:
     rings = [np.stack([r * np.cos(a), r * np.sin(a)], axis=1) for r, a in ((10, angle), (inner, angle + np.pi / 5))]
     plan = np.concatenate(rings)
 
-    def at(i: int, z: float) -> list[float]:
+    def at(i, z):
         return [*plan[i], z]
 
     found = []
@@ -53,10 +51,10 @@ def pentagram(peaks: bool) -> np.ndarray:
     return np.array(found)
 
 
-def double_sphere(n: int = 6) -> tuple[np.ndarray, np.ndarray]:
+def double_sphere(n=6):
     """A sphere that goes round twice between its poles; the second round is listed apart and has other diagonals."""
     points = [[0.0, 0.0, 10.0], [0.0, 0.0, -10.0]]
-    place: dict[tuple[int, int], int] = {}
+    place = {}
     for i in range(1, n):
         for j in range(4 * n):
             place[i, j] = len(points)
@@ -72,7 +70,7 @@ def double_sphere(n: int = 6) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(faces)
 
 
-def prisms(triangles: list, height: float = 5) -> np.ndarray:
+def prisms(triangles, height=5):
     """Upright prisms over triangles in plan that turn anticlockwise or clockwise; common walls are left out."""
     found, sides = [], {}
     for corners in triangles:
@@ -95,7 +93,7 @@ EDGE_TO_EDGE = np.concatenate([box(), box(at=(10, 10, 0))])
     "body", [pentagram(True), pentagram(False), BOW_TIE], ids=["pentagram with peaks", "pentagram", "bow tie"]
 )
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_shell_that_passes_through_itself_along_edges(body: np.ndarray, name: str, judge) -> None:
+def test_a_shell_that_passes_through_itself_along_edges(body, name, judge):
     for seed, scale, shift, mirror in ((0, 1, 0, False), (1, 1, 20, True), (2, 7.3, 100, False), (3, 0.3, 1, True)):
         moved = turned(body, seed, scale, shift, mirror) if seed else body
         found = {item.code: item for item in judge(in_format(moved, name), name).findings}
@@ -106,7 +104,7 @@ def test_a_shell_that_passes_through_itself_along_edges(body: np.ndarray, name: 
 
 @pytest.mark.parametrize("listed_apart", [False, True])
 @pytest.mark.parametrize("form", [text_ply, obj], ids=["ply", "obj"])
-def test_vertices_listed_apart_do_not_hide_an_overlap(listed_apart: bool, form, judge) -> None:
+def test_vertices_listed_apart_do_not_hide_an_overlap(listed_apart, form, judge):
     points, faces = double_sphere()
     if not listed_apart:
         points, faces = weld_exact(points[faces])
@@ -119,7 +117,7 @@ def test_vertices_listed_apart_do_not_hide_an_overlap(listed_apart: bool, form, 
 
 @pytest.mark.parametrize("body", [EDGE_TO_EDGE, TWO_WEDGES], ids=["cubes", "wedges"])
 @pytest.mark.parametrize("apart", [False, True])
-def test_solids_that_share_an_edge_do_not_overlap(body: np.ndarray, apart: bool) -> None:
+def test_solids_that_share_an_edge_do_not_overlap(body, apart):
     for seed in range(6):
         moved = turned(body, seed, 1 + seed, 10 * seed, bool(seed % 2)).astype(np.float32).astype(float)
         points, faces = weld_exact(moved)
@@ -138,7 +136,7 @@ def test_solids_that_share_an_edge_do_not_overlap(body: np.ndarray, apart: bool)
     values=st.sampled_from([(0, 1), (0, 1, 2), (-1, 0, 1), (0, 1, 2, 3)]),
     turn=st.booleans(),
 )
-def test_every_winding_number_but_0_and_1_is_an_error(seed: int, values: tuple[int, ...], turn: bool) -> None:
+def test_every_winding_number_but_0_and_1_is_an_error(seed, values, turn):
     """Random cells with a winding number each, and the surface between them: neighbours differ by one at most, so that
     no face is there twice; where edges meet the surface touches itself in every way that a grid has.
     """
@@ -163,7 +161,7 @@ def test_every_winding_number_but_0_and_1_is_an_error(seed: int, values: tuple[i
 
 @settings(max_examples=40, deadline=None)
 @given(n=st.integers(4, 12), seed=st.integers(0, 10**6), turn=st.booleans(), scale=st.sampled_from([0.3, 1.0, 40.0]))
-def test_faces_of_one_concave_polygon_are_not_accused(n: int, seed: int, turn: bool, scale: float) -> None:
+def test_faces_of_one_concave_polygon_are_not_accused(n, seed, turn, scale):
     """Top and bottom of a prism are one concave polygon each, cut into triangles that do not overlap."""
     rng = np.random.default_rng(seed)
     angle = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
@@ -183,7 +181,7 @@ def test_faces_of_one_concave_polygon_are_not_accused(n: int, seed: int, turn: b
 @pytest.mark.parametrize("cells", [1, 2, 5])
 @pytest.mark.parametrize("place", ["attached", "beside", "alone", "on a face", "in a corner"])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_fin_is_an_error_whichever_way_its_quads_are_cut(cells: int, place: str, seed: int) -> None:
+def test_a_fin_is_an_error_whichever_way_its_quads_are_cut(cells, place, seed):
     verdicts = []
     for other in (False, True):
         sheet = fin(other_diagonals=other, cells=cells)
@@ -213,7 +211,7 @@ def test_a_fin_is_an_error_whichever_way_its_quads_are_cut(cells: int, place: st
     ],
     ids=["stacked", "in a cavity", "cavity at the surface", "stacked flush", "cavity in the corner"],
 )
-def test_solids_touch_but_a_cavity_at_the_surface_leaves_no_wall(parts, thin: bool, gap: float, seed: int) -> None:
+def test_solids_touch_but_a_cavity_at_the_surface_leaves_no_wall(parts, thin, gap, seed):
     body = np.concatenate(parts(gap))
     if seed:  # quarter turns keep faces in one plane
         body = np.roll(body, seed, axis=2) * [1, 1, 1] + [seed, -seed, 0]

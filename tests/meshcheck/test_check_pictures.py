@@ -1,7 +1,5 @@
 """`unitcad check --pictures`: a picture a finding and a coloured 3MF, without CAD, a display or a GPU."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import io
@@ -13,7 +11,6 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +27,7 @@ CROSSED = np.concatenate([box(), box((4, 4, 4), (8, 3, 3))])
 CAVITY = np.concatenate([box((20, 20, 20)), box((5, 5, 5), (7, 7, 7))[:, ::-1]])
 
 
-def views(path: Path) -> list[np.ndarray]:
+def views(path):
     """The pixels of a picture's views."""
     root = ET.parse(path).getroot()
     found = [image.get("href", "") for image in root.iter(f"{SVG}image")]
@@ -38,13 +35,13 @@ def views(path: Path) -> list[np.ndarray]:
     return [np.array(Image.open(io.BytesIO(base64.b64decode(href.partition(",")[2])))) for href in found]
 
 
-def reddish(pixels: np.ndarray) -> np.ndarray:
+def reddish(pixels):
     """Which pixels have the hue of an error."""
     red, green, blue = np.moveaxis(pixels.astype(int), 2, 0)
     return (red > 90) & (green < 0.3 * red) & (blue < 0.3 * red)
 
 
-def test_each_finding_has_a_picture_of_the_part_and_of_the_place(tmp_path: Path) -> None:
+def test_each_finding_has_a_picture_of_the_part_and_of_the_place(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(CROSSED))
     (tmp_path / "good.stl").write_bytes(stl(box()))
     plain = run(".", "--json", cwd=tmp_path)
@@ -73,9 +70,7 @@ def test_each_finding_has_a_picture_of_the_part_and_of_the_place(tmp_path: Path)
     [("double", "T009", np.concatenate([box(), box()[4:5]])), ("inverted", "T008", box()[:, ::-1]),
      ("cavity", "D004", CAVITY)],
 )  # fmt: skip
-def test_the_faces_concerned_are_seen_in_the_near_view(
-    tmp_path: Path, name: str, code: str, triangles: np.ndarray
-) -> None:
+def test_the_faces_concerned_are_seen_in_the_near_view(tmp_path, name, code, triangles):
     (tmp_path / "a.stl").write_bytes(stl(triangles))
     run("a.stl", "--select", code, "--printer", "fdm-0.4", "--pictures", "p", cwd=tmp_path)
     _, near = views(tmp_path / "p" / "a.stl" / f"{code}.svg")
@@ -83,7 +78,7 @@ def test_the_faces_concerned_are_seen_in_the_near_view(
     assert coloured.mean() > 0.005
 
 
-def test_a_hidden_place_is_seen_through_a_cut(tmp_path: Path) -> None:
+def test_a_hidden_place_is_seen_through_a_cut(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(CAVITY))
     run("a.stl", "--select", "G006", "--pictures", "p", cwd=tmp_path)
     path = tmp_path / "p" / "a.stl" / "G006.svg"
@@ -93,7 +88,7 @@ def test_a_hidden_place_is_seen_through_a_cut(tmp_path: Path) -> None:
     assert "cut open" not in (tmp_path / "p" / "b.stl" / "T008.svg").read_text("utf-8")
 
 
-def test_the_marked_sides_are_the_holes(tmp_path: Path) -> None:
+def test_the_marked_sides_are_the_holes(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     run("a.stl", "--pictures", "p", cwd=tmp_path)
     root = ET.parse(tmp_path / "p" / "a.stl" / "T001.svg").getroot()
@@ -102,7 +97,7 @@ def test_the_marked_sides_are_the_holes(tmp_path: Path) -> None:
         assert marked.count("M") == 4
 
 
-def painted(data: bytes) -> list[list[tuple[str, ...]]]:
+def painted(data):
     """Colour and vertices of the triangles of each object."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         root = ET.fromstring(archive.read("3D/3dmodel.model"))
@@ -115,12 +110,12 @@ def painted(data: bytes) -> list[list[tuple[str, ...]]]:
     return found
 
 
-def test_the_3mf_has_the_faces_in_the_colour_of_the_worst_severity(tmp_path: Path) -> None:
+def test_the_3mf_has_the_faces_in_the_colour_of_the_worst_severity(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(stl(np.concatenate([box(), box()[4:5], box(at=(30, 0, 0))[2:]])))
     result = run("a.stl", "--json", "--all-locations", "--pictures", "p", cwd=tmp_path)
     findings = json.loads(result.stdout)["files"][0]["findings"]
-    worst: dict[int, str] = {}
+    worst = {}
     for found in sorted(findings, key=lambda item: ["info", "warning", "error"].index(item["severity"])):
         worst |= dict.fromkeys((face for place in found["locations"] for face in place["faces"]), found["severity"])
     written = (tmp_path / "p" / "a.stl" / "findings.3mf").read_bytes()
@@ -131,7 +126,7 @@ def test_the_3mf_has_the_faces_in_the_colour_of_the_worst_severity(tmp_path: Pat
     assert len(colours) == 23
 
 
-def test_the_3mf_opens_elsewhere(tmp_path: Path) -> None:
+def test_the_3mf_opens_elsewhere(tmp_path):
     resources = (
         f'<object id="1" name="good">{mesh_xml()}</object>'
         f'<object id="2" name="open">{mesh_xml(CUBE_CORNERS * 10 + 40, CUBE_FACES[2:])}</object>'
@@ -156,7 +151,7 @@ def test_the_3mf_opens_elsewhere(tmp_path: Path) -> None:
     assert re.findall(r"number_of_facets = +(\d+)", done.stdout)[-1] == "10"
 
 
-def test_files_without_a_mesh_or_a_finding_have_no_picture(tmp_path: Path) -> None:
+def test_files_without_a_mesh_or_a_finding_have_no_picture(tmp_path):
     (tmp_path / "good.stl").write_bytes(stl(box()))
     (tmp_path / "cut.stl").write_bytes(stl(box())[:-80])
     (tmp_path / "nan.stl").write_bytes(stl(box((np.nan, 1, 1))))
@@ -166,7 +161,7 @@ def test_files_without_a_mesh_or_a_finding_have_no_picture(tmp_path: Path) -> No
     assert not (tmp_path / "p").exists()
 
 
-def test_a_finding_without_a_place_shows_the_whole_part(tmp_path: Path) -> None:
+def test_a_finding_without_a_place_shows_the_whole_part(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box((0.2, 0.3, 0.4)), header=b"solid"))
     run("a.stl", "--pictures", "p", cwd=tmp_path)
     for code in ("F007", "S001"):
@@ -180,11 +175,11 @@ def test_a_finding_without_a_place_shows_the_whole_part(tmp_path: Path) -> None:
      ("CON.stl", r"CON\.stl-[0-9a-f]{8}"), ("ä<b>&.stl", r"b_\.stl-[0-9a-f]{8}"), ("../a.stl", r"a\.stl-[0-9a-f]{8}"),
      ("\udce4", "file-[0-9a-f]{8}"), ("x" * 300 + ".stl", r"x{76}\.stl-[0-9a-f]{8}")],
 )  # fmt: skip
-def test_folders_have_plain_names_of_their_own(path: str, name: str) -> None:
+def test_folders_have_plain_names_of_their_own(path, name):
     assert re.fullmatch(name, finding_pictures.folder_name(path))
 
 
-def test_a_folder_that_cannot_be_written_is_one_error(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_one_error(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     (tmp_path / "p").write_text("a file")
     for jobs in ("1", "2"):
@@ -192,7 +187,7 @@ def test_a_folder_that_cannot_be_written_is_one_error(tmp_path: Path) -> None:
         assert (result.returncode, len(result.stderr.splitlines())) == (2, 1)
 
 
-def test_nothing_of_cad_and_no_display_is_needed(tmp_path: Path) -> None:
+def test_nothing_of_cad_and_no_display_is_needed(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     code = (
         "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'check', 'a.stl', '--pictures', 'p']\n"

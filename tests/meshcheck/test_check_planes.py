@@ -1,19 +1,17 @@
 """Floats may leave a pair of faces open, but what they set apart is apart: against exact signs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from unitcad.meshcheck.geometry.crossings import _flush
 from unitcad.meshcheck.geometry.mesh import area_vectors
 from unitcad.meshcheck.geometry.predicates import meet
-from unitcad.meshcheck.geometry.sieves import Planes, planes_of
+from unitcad.meshcheck.geometry.sieves import planes_of
 
 N = 4000
 
 
-def _pairs(kind: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(kind, rng):
     """Corners of pairs of triangles (n, 3, 3), near to touching."""
     if kind == "lattice":
         return rng.integers(-2, 3, (2, N, 3, 3)).astype(float)[0], rng.integers(-2, 3, (N, 3, 3)).astype(float)
@@ -31,7 +29,7 @@ def _pairs(kind: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]
     return a, b
 
 
-def _planes(a: np.ndarray, b: np.ndarray) -> Planes:
+def _planes(a, b):
     """Faces 0 to n - 1 are a, n to 2 n - 1 are b."""
     points = np.concatenate([a, b]).reshape(-1, 3)
     faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
@@ -46,7 +44,7 @@ KINDS = ["lattice", "near", "slivers", "sizes", "far away"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_a_plane_sets_apart_is_apart(kind: str) -> None:
+def test_what_a_plane_sets_apart_is_apart(kind):
     a, b = _pairs(kind, np.random.default_rng(KINDS.index(kind)))
     planes, i = _planes(a, b), np.arange(N)
     solid = (planes.normal != 0).any(axis=0)
@@ -61,7 +59,7 @@ def test_what_a_plane_sets_apart_is_apart(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [1, 2])
-def test_faces_that_share_corners_have_no_more_in_common(kind: str, shared: int) -> None:
+def test_faces_that_share_corners_have_no_more_in_common(kind, shared):
     """No crossing and no common area; of faces at one edge the third corner is off the plane or across the edge."""
     a, b = _pairs(kind, np.random.default_rng([shared, KINDS.index(kind)]))
     b[:, :shared] = a[:, :shared]
@@ -77,7 +75,7 @@ def test_faces_that_share_corners_have_no_more_in_common(kind: str, shared: int)
         assert ((exact.side_b != 0).sum(axis=1) <= 1).all()
 
 
-def test_faces_on_both_sides_of_a_level_plane_do_no_more_than_touch() -> None:
+def test_faces_on_both_sides_of_a_level_plane_do_no_more_than_touch():
     """On a lattice, where most boxes have sides in common."""
     a, b = _pairs("lattice", np.random.default_rng(7))
     found = _flush(a.transpose(1, 2, 0), b.transpose(1, 2, 0))

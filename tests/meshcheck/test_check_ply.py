@@ -1,7 +1,5 @@
 """PLY: the header's counts against what the file holds, and triangle strips, as the Stanford scans have them."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np
@@ -20,7 +18,7 @@ WAYS = {
 }
 
 
-def cube(vertices: int = 8, faces: int = 12, order: str = "<", newline: bytes = b"\n") -> bytes:
+def cube(vertices=8, faces=12, order="<", newline=b"\n"):
     """A cube whose header promises other numbers of vertices and faces than the 8 and 12 that follow."""
     head, end, body = ply(CUBE, CUBE_FACES.tolist(), order, coordinate="float").partition(b"end_header\n")
     head = (head + end).replace(b"vertex 8", b"vertex %d" % vertices).replace(b"face 12", b"face %d" % faces)
@@ -29,7 +27,7 @@ def cube(vertices: int = 8, faces: int = 12, order: str = "<", newline: bytes = 
 
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
-def test_a_sound_cube_passes(order: str, newline: bytes, judge) -> None:
+def test_a_sound_cube_passes(order, newline, judge):
     report = judge(cube(order=order, newline=newline), "cube.ply")
     assert report.findings == ()
     assert report.facts.volume_mm3 == pytest.approx(1000)
@@ -50,13 +48,13 @@ def test_a_sound_cube_passes(order: str, newline: bytes, judge) -> None:
         (cube().replace(b"float z", b"float w"), "F003", "its elements are not those of a mesh"),
     ],
 )
-def test_wrong_counts_are_named(content: bytes, code: str, said: str, judge) -> None:
+def test_wrong_counts_are_named(content, code, said, judge):
     report = judge(content, "cube.ply")
     assert [found for found in report.findings if found.code == code and said in found.message], report.findings
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_elements_end_where_their_records_do(seed: int, judge) -> None:
+def test_elements_end_where_their_records_do(seed, judge):
     """Random elements with lists of one length, of many, and runs of each; any byte less is one too few."""
     rng = np.random.default_rng(seed)
     sign = "<>"[seed % 2]
@@ -85,7 +83,7 @@ def test_elements_end_where_their_records_do(seed: int, judge) -> None:
     assert "e2 record" in found.message
 
 
-def test_numbers_after_the_last_property_of_a_text_face_are_a_warning(judge) -> None:
+def test_numbers_after_the_last_property_of_a_text_face_are_a_warning(judge):
     """MeshLab announces plain colours of faces and writes a list."""
     text = ply(CUBE, CUBE_FACES.tolist(), "").decode()
     lines = text.split("\n")
@@ -96,7 +94,7 @@ def test_numbers_after_the_last_property_of_a_text_face_are_a_warning(judge) -> 
     assert [found.code for found in judge(wide, "a.ply").findings] == ["F003"]
 
 
-def test_an_element_named_twice_is_refused(judge) -> None:
+def test_an_element_named_twice_is_refused(judge):
     head, body = cube().split(b"end_header\n")
     twice = head + b"element face 0\nproperty list uchar int vertex_indices\nend_header\n" + body
     assert "names element face twice" in judge(twice, "a.ply").findings[0].message
@@ -104,7 +102,7 @@ def test_an_element_named_twice_is_refused(judge) -> None:
 
 @pytest.mark.parametrize("order", ["", "<", ">"])
 @pytest.mark.parametrize("way", WAYS)
-def test_strips_of_a_cube_are_a_cube(way: str, order: str, judge) -> None:
+def test_strips_of_a_cube_are_a_cube(way, order, judge):
     content = ply(CUBE, WAYS[way], order, count="int").replace(b"element face", b"element tristrips")
     report = judge(content, "a.ply")
     assert report.findings == ()

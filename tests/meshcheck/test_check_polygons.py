@@ -1,7 +1,5 @@
 """Polygons of PLY, OBJ and OFF: faces of differing sizes, concave ones, bent ones, and where they stand."""
 
-from __future__ import annotations
-
 import io
 import itertools
 
@@ -11,10 +9,8 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from polygon_files import every_way, obj, off, ply
-from shapes import CUBE_CORNERS, Judge, finding, turned
+from shapes import CUBE_CORNERS, finding, turned
 
-from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers import reader_of
 from unitcad.meshcheck.rules.f_file import Deadline, Limits
 
@@ -25,15 +21,15 @@ SHARP = [(0, 0), (9, 0), (9, 9), (8, 1), (7, 9), (6, 1), (5, 9), (4, 1), (3, 9),
 NOTCHED = [(0, 0), (3, 0), (6, 0), (6, 5), (4, 5), (4, 2), (2, 2), (2, 5), (0, 5), (0, 3)]  # corners on a line
 
 
-def read(name: str, content: bytes) -> Mesh:
-    findings: list[Finding] = []
+def read(name, content):
+    findings = []
     mesh = reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(60), findings)
     assert {found.code for found in findings} <= {"T012"}
     assert mesh is not None
     return mesh
 
 
-def prism(outline: list, turn: int, hand: int) -> tuple[np.ndarray, list[list[int]]]:
+def prism(outline, turn, hand):
     """A prism whose caps are one polygon each, beginning at corner `turn`; mirrored for hand -1."""
     n = len(outline)
     plan = np.array(outline, float) * [hand, 1]
@@ -44,7 +40,7 @@ def prism(outline: list, turn: int, hand: int) -> tuple[np.ndarray, list[list[in
 
 
 @pytest.mark.parametrize("faces", [QUADS, HALF], ids=["quads", "mixed"])
-def test_faces_of_differing_sizes_are_read_in_every_format(faces: list, judge: Judge) -> None:
+def test_faces_of_differing_sizes_are_read_in_every_format(faces, judge):
     for name, content in every_way(CUBE_CORNERS * 10, faces).items():
         report = judge(content, name)
         assert report.findings == (), name
@@ -54,7 +50,7 @@ def test_faces_of_differing_sizes_are_read_in_every_format(faces: list, judge: J
 
 @pytest.mark.parametrize(("outline", "area"), [(CHEVRON, 4), (SHARP, 45), (NOTCHED, 24)], ids=["quad", "comb", "notch"])
 @pytest.mark.parametrize("hand", [1, -1])
-def test_concave_polygons_are_cut_within_their_outline(outline: list, area: float, hand: int, judge: Judge) -> None:
+def test_concave_polygons_are_cut_within_their_outline(outline, area, hand, judge):
     for turn in range(len(outline)):
         points, faces = prism(outline, turn, hand)
         for name, content in (("a.ply", ply(points, faces, "")), ("a.obj", obj(points, faces)),
@@ -65,7 +61,7 @@ def test_concave_polygons_are_cut_within_their_outline(outline: list, area: floa
             assert report.facts.triangles == 2 * (len(outline) - 2) + 2 * len(outline)
 
 
-def test_polygons_that_are_not_flat_are_named(judge: Judge) -> None:
+def test_polygons_that_are_not_flat_are_named(judge):
     bent = CUBE_CORNERS * 10
     bent[7, 2] += 1  # of the three quads round this corner the one at z = 10 is not flat any more
     for name, content in every_way(bent, QUADS).items():
@@ -78,14 +74,14 @@ def test_polygons_that_are_not_flat_are_named(judge: Judge) -> None:
     assert judge(ply(near, QUADS), "a.ply").findings == ()
 
 
-def test_rounding_bends_no_polygon(judge: Judge) -> None:
+def test_rounding_bends_no_polygon(judge):
     points, faces = prism(SHARP, 0, 1)
     for seed in range(5):
         report = judge(ply(turned(points, seed) + 500, faces, "<", coordinate="float"), "a.ply")
         assert not report.has("F013")
 
 
-def test_places_are_those_of_the_polygons(judge: Judge) -> None:
+def test_places_are_those_of_the_polygons(judge):
     """A hole beside face 4 of the file, its line and its object, though that face is two triangles."""
     content = obj(CUBE_CORNERS * 10, QUADS[:-1]).decode().split("\n")
     first = next(i for i, line in enumerate(content) if line.startswith("f"))
@@ -109,7 +105,7 @@ def test_places_are_those_of_the_polygons(judge: Judge) -> None:
     assert all(text.split("\n")[(place.line or 0) - 1][:2] == "4 " for place in hole.locations)
 
 
-def test_groups_name_faces_where_there_is_no_object(judge: Judge) -> None:
+def test_groups_name_faces_where_there_is_no_object(judge):
     content = obj(CUBE_CORNERS * 10, QUADS[:-1]).replace(b"f ", b"g side\nf ", 1)
     hole = finding(judge(content, "a.obj"), "T001")
     assert {place.object for place in hole.locations} == {"side"}
@@ -134,9 +130,7 @@ def test_groups_name_faces_where_there_is_no_object(judge: Judge) -> None:
         ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", "F004", "'1.5' is not a vertex's index", None),
     ],
 )  # fmt: skip
-def test_what_breaks_a_text_is_named_with_its_line(
-    name: str, content: str, code: str, said: str, line: int | None, judge: Judge
-) -> None:
+def test_what_breaks_a_text_is_named_with_its_line(name, content, code, said, line, judge):
     found = finding(judge(content, name), code)
     assert said in found.message
     assert [place.line for place in found.locations] == ([line] if line else [])
@@ -146,14 +140,14 @@ POINTS = st.lists(st.tuples(*[st.floats(-1e6, 1e6, width=32)] * 3), min_size=3, 
 FACES = st.lists(st.lists(st.integers(0, 8), min_size=3, max_size=7), min_size=1, max_size=9)
 
 
-def area_vector(points: np.ndarray, face: list[int]) -> np.ndarray:
+def area_vector(points, face):
     ring = points[face] - points[face[0]]
     return np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(corners=POINTS, drawn=FACES)
-def test_any_polygons_keep_their_corners_and_area_in_every_format(corners: list, drawn: list) -> None:
+def test_any_polygons_keep_their_corners_and_area_in_every_format(corners, drawn):
     """Whatever the outline: as many triangles as it takes, its own corners, and its own vector of area."""
     points = np.array(corners, float)
     faces = [[i % len(points) for i in face] for face in drawn]
@@ -176,7 +170,7 @@ def test_any_polygons_keep_their_corners_and_area_in_every_format(corners: list,
 
 @settings(max_examples=40, deadline=None)
 @given(corners=POINTS, drawn=st.lists(st.lists(st.integers(0, 8), min_size=3, max_size=3), min_size=1, max_size=9))
-def test_triangles_are_those_that_trimesh_reads(corners: list, drawn: list) -> None:
+def test_triangles_are_those_that_trimesh_reads(corners, drawn):
     points = np.array(corners, float)
     faces = [[i % len(points) for i in face] for face in drawn]
     for name in ("little.ply", "text.ply", "plain.obj", "plain.off"):
@@ -193,7 +187,7 @@ def test_triangles_are_those_that_trimesh_reads(corners: list, drawn: list) -> N
 @pytest.mark.parametrize(("coordinate", "count", "index"), list(itertools.product(
     ("float", "double", "float32", "float64", "short", "int16"), ("char", "uint8", "ushort", "int32"),
     ("uchar", "int8", "uint16", "int", "uint"))))  # fmt: skip
-def test_all_types_of_ply(coordinate: str, count: str, index: str) -> None:
+def test_all_types_of_ply(coordinate, count, index):
     for order in "<>":
         mesh = read("a.ply", ply(CUBE_CORNERS * 10, HALF, order, coordinate=coordinate, count=count, index=index))
         assert (len(mesh.faces), len(mesh.vertices)) == (12, 8)

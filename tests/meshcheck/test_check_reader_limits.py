@@ -1,13 +1,9 @@
 """What readers cost: time that grows with the file, memory that grows with its vertices and faces alone."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
 import tracemalloc
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,14 +17,14 @@ FACET = "\n".join(text_stl(box()).split("\n")[1:8]) + "\n"
 CUBE = obj(CUBE_CORNERS, [[0, 1, 3], [0, 3, 2], [4, 6, 7]])
 
 
-def read(name: str, content: bytes) -> None:
+def read(name, content):
     try:
         reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(600), [])
     except Unreadable as stop:
         assert not any(found.code == "F011" for found in stop.findings)
 
 
-def peak(name: str, content: bytes) -> int:
+def peak(name, content):
     """The most memory that reading takes at a time, bytes."""
     tracemalloc.start()
     try:
@@ -38,7 +34,7 @@ def peak(name: str, content: bytes) -> int:
         tracemalloc.stop()
 
 
-def grid(n: int) -> tuple[np.ndarray, list[list[int]]]:
+def grid(n):
     """A square of n x n quads."""
     x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0))
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
@@ -46,7 +42,7 @@ def grid(n: int) -> tuple[np.ndarray, list[list[int]]]:
     return points, np.column_stack([first, first + 1, first + n + 2, first + n + 1]).tolist()
 
 
-LINEAR: dict[str, tuple[str, Callable[[int], bytes]]] = {
+LINEAR  = {
     "solid lines": ("a.stl", lambda n: b"solid a\n" * n),
     "solids that do not end": ("a.stl", lambda n: f"solid a\n{FACET}".encode() * n),
     "solids": ("a.stl", lambda n: f"solid a\n{FACET}endsolid a\n".encode() * n),
@@ -63,17 +59,17 @@ LINEAR: dict[str, tuple[str, Callable[[int], bytes]]] = {
 }  # fmt: skip
 
 
-def round_(n: int) -> np.ndarray:
+def round_(n):
     angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
     return np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
 
 
 @pytest.mark.parametrize("name", LINEAR)
-def test_time_grows_with_the_size(name: str) -> None:
+def test_time_grows_with_the_size(name):
     """Eight times the size takes at most 24 times as long (64 where each line is looked for from the start)."""
     file, made = LINEAR[name]
 
-    def seconds(content: bytes) -> float:
+    def seconds(content):
         times = []
         for _ in range(2):
             begin = time.process_time()
@@ -85,7 +81,7 @@ def test_time_grows_with_the_size(name: str) -> None:
     assert seconds(made(8 * n)) < 24 * seconds(made(n)) + 0.05
 
 
-def test_materials_take_no_memory() -> None:
+def test_materials_take_no_memory():
     """trimesh makes a mesh of all vertices for each material."""
     points, faces = grid(60)
     plain = obj(points, faces)
@@ -96,7 +92,7 @@ def test_materials_take_no_memory() -> None:
 
 
 @pytest.mark.parametrize("file", ["a.obj", "a.off", "text.ply", "a.ply"])
-def test_memory_is_a_few_times_the_meshs(file: str) -> None:
+def test_memory_is_a_few_times_the_meshs(file):
     """Less than 500 bytes for a quad and its vertex, which take 24 + 32 as numbers and 72 as welded triangles."""
     points, faces = grid(150)
     content = {"a.obj": obj(points, faces), "a.off": off(points, faces), "text.ply": ply(points, faces, ""),
@@ -105,7 +101,7 @@ def test_memory_is_a_few_times_the_meshs(file: str) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="address space is bounded on Linux only")
-def test_an_obj_of_many_materials_is_judged_in_little_address_space(tmp_path: Path) -> None:
+def test_an_obj_of_many_materials_is_judged_in_little_address_space(tmp_path):
     """200 materials over 90,000 vertices took 1 GB where each had its own."""
     points, faces = grid(300)
     head, _, rows = obj(points, faces).partition(b"\nf")

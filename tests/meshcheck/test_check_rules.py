@@ -1,7 +1,5 @@
 """A rule is one file: its text and its code, which nothing else lists."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -34,7 +32,7 @@ def check_mesh(part):
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def folder(tmp_path, monkeypatch):
     """A second folder of rules."""
     monkeypatch.setattr(rules, "__path__", [*rules.__path__, str(tmp_path)])
     yield tmp_path
@@ -42,7 +40,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     registry.rules.cache_clear()
 
 
-def test_a_file_in_the_folder_is_a_rule_everywhere(folder: Path) -> None:
+def test_a_file_in_the_folder_is_a_rule_everywhere(folder):
     (folder / "g_long.py").write_text(LONG)
     registry.modules.cache_clear()
     registry.rules.cache_clear()
@@ -56,7 +54,7 @@ def test_a_file_in_the_folder_is_a_rule_everywhere(folder: Path) -> None:
     assert "A rod." in registry.explain("g999")
 
 
-def test_two_rules_of_one_code_are_refused(folder: Path) -> None:
+def test_two_rules_of_one_code_are_refused(folder):
     (folder / "t_again.py").write_text(LONG.replace("G999", "T001"))
     registry.modules.cache_clear()
     registry.rules.cache_clear()
@@ -64,7 +62,7 @@ def test_two_rules_of_one_code_are_refused(folder: Path) -> None:
         registry.rules()
 
 
-def test_every_rule_stands_in_a_file_of_its_family_or_of_the_code_that_finds_it() -> None:
+def test_every_rule_stands_in_a_file_of_its_family_or_of_the_code_that_finds_it():
     homes = {code: Path(module.__file__ or "").name for module in registry.modules() for code in vars(module)}
     assert {code: homes[code] for code in registry.rules() if homes[code][0].upper() != code[0]} == {
         "T008": "g_shells.py"  # which shells face inwards follows from which lies in which

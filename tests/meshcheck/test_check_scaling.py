@@ -1,9 +1,5 @@
 """Work grows with the faces: counted, not timed. What reaches the exact stages and manifold3d, by size."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
@@ -12,10 +8,8 @@ from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.geometry import crossings, predicates
 from unitcad.meshcheck.rules import g_shells
 
-Built = tuple[np.ndarray, np.ndarray]
 
-
-def cubes(n: int, turned: bool = False) -> Built:
+def cubes(n, turned=False):
     """n cubed cubes of 10 mm that touch."""
     place = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     points = (CUBE_CORNERS + place).reshape(-1, 3) * 10
@@ -25,7 +19,7 @@ def cubes(n: int, turned: bool = False) -> Built:
     return points, (CUBE_FACES + 8 * np.arange(n**3)[:, None, None]).reshape(-1, 3).astype(np.int32)
 
 
-def plate(n: int, around: int = 24) -> Built:
+def plate(n, around=24):
     """A plate with n squared round holes, cut into triangles by manifold3d: rims with fans of thin triangles."""
     from manifold3d import CrossSection, Manifold
 
@@ -40,14 +34,14 @@ def plate(n: int, around: int = 24) -> Built:
 
 
 @pytest.fixture
-def work(monkeypatch: pytest.MonkeyPatch) -> Callable[[Built], dict[str, float]]:
+def work(monkeypatch):
     """Pairs that get past the sieves, pairs decided, rows of Python's integers and booleans, a face of the mesh."""
-    count: dict[str, int] = {}
+    count = {}
 
-    def watch(module: object, name: str, key: str, rows: Callable[..., int]) -> None:
+    def watch(module, name, key, rows):
         real = getattr(module, name)
 
-        def counted(*given: object) -> object:
+        def counted(*given):
             count[key] = count.get(key, 0) + rows(*given)
             return real(*given)
 
@@ -58,7 +52,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Callable[[Built], dict[str, float]]
     watch(predicates, "integers", "integers", lambda values: values.shape[-1])
     watch(g_shells, "_shared", "booleans", lambda *_: 1)
 
-    def judged(built: Built) -> dict[str, float]:
+    def judged(built):
         count.clear()
         count.update(dict.fromkeys(("sieved", "decided", "integers", "booleans"), 0))
         check_mesh(*built)
@@ -67,7 +61,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Callable[[Built], dict[str, float]]
     return judged
 
 
-def test_touching_cubes(work: Callable[[Built], dict[str, float]]) -> None:
+def test_touching_cubes(work):
     """A cube has 26 neighbours at most, and the share of those inside grows a little with the size."""
     small, large = work(cubes(5)), work(cubes(10))
     assert large["sieved"] < 1.3 * small["sieved"] < 60
@@ -75,21 +69,21 @@ def test_touching_cubes(work: Callable[[Built], dict[str, float]]) -> None:
     assert large["booleans"] == large["integers"] == 0
 
 
-def test_touching_cubes_that_are_turned(work: Callable[[Built], dict[str, float]]) -> None:
+def test_touching_cubes_that_are_turned(work):
     small, large = work(cubes(4, turned=True)), work(cubes(8, turned=True))
     assert large["sieved"] < 1.5 * small["sieved"] < 90
     assert large["booleans"] <= 26 / 2 / 12
     assert large["integers"] == 0
 
 
-def test_plates_with_round_holes(work: Callable[[Built], dict[str, float]]) -> None:
+def test_plates_with_round_holes(work):
     small, large = work(plate(5)), work(plate(12))
     assert large["sieved"] < 2 * small["sieved"] < 3
     assert large["decided"] < 0.2
     assert large["integers"] == 0
 
 
-def test_slivers_and_doubled_faces(work: Callable[[Built], dict[str, float]]) -> None:
+def test_slivers_and_doubled_faces(work):
     """A bent sheet of slivers on a turned plane, and every third face twice, a hair off: few need long integers.
 
     A row of these takes 2 us; the check of a face takes 1 us.

@@ -1,10 +1,7 @@
 """Settings of `unitcad check` in unitcad.toml and pyproject.toml: found upwards, beaten by the command line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 from shapes import box, package, stl
@@ -14,7 +11,7 @@ HOLE, WARN, FILM = stl(box()[2:]), stl(box(), header=b"solid"), stl(box((20, 20,
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     (tmp_path / "sub" / "deep").mkdir(parents=True)
     (tmp_path / "sub" / "hole.stl").write_bytes(HOLE)
     (tmp_path / "sub" / "warn.stl").write_bytes(WARN)
@@ -25,7 +22,7 @@ def folder(tmp_path: Path) -> Path:
 TOOL = "[tool.unitcad.check]"
 
 
-def codes(result: CompletedProcess) -> dict[str, list[str]]:
+def codes(result):
     files = json.loads(result.stdout)["files"]
     return {Path(entry["path"]).name: [found["code"] for found in entry["findings"]] for entry in files}
 
@@ -34,7 +31,7 @@ def codes(result: CompletedProcess) -> dict[str, list[str]]:
     ("name", "head"),
     [(f"{where}.toml", head) for where, head in [("unitcad", "[check]"), ("unitcad", TOOL), ("pyproject", TOOL)]],
 )
-def test_the_nearest_file_upwards_is_used_and_named(folder: Path, name: str, head: str) -> None:
+def test_the_nearest_file_upwards_is_used_and_named(folder, name, head):
     (folder / name).write_text(f'{head}\nselect = ["F007"]\n')
     result = run(".", "--json", cwd=folder / "sub" / "deep")
     assert json.loads(result.stdout)["config"] == f"../../{name}"
@@ -44,7 +41,7 @@ def test_the_nearest_file_upwards_is_used_and_named(folder: Path, name: str, hea
     assert json.loads(run("..", "--json", cwd=folder / "sub").stdout)["config"] == name
 
 
-def test_files_without_our_table_are_passed_over(folder: Path) -> None:
+def test_files_without_our_table_are_passed_over(folder):
     (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
     (folder / "sub" / "pyproject.toml").write_text("[tool.other]\nkey = 1\n")
     (folder / "sub" / "deep" / "unitcad.toml").write_text('design = "embedded"\nselect = "a spec is no settings"\n')
@@ -52,7 +49,7 @@ def test_files_without_our_table_are_passed_over(folder: Path) -> None:
     assert run("hole.stl", cwd=folder / "sub").returncode == 0
 
 
-def test_a_pyproject_that_does_not_mention_us_may_be_broken(folder: Path) -> None:
+def test_a_pyproject_that_does_not_mention_us_may_be_broken(folder):
     """Also with an escape in it, with which our name may be written."""
     (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
     broken = folder / "sub" / "pyproject.toml"
@@ -64,15 +61,15 @@ def test_a_pyproject_that_does_not_mention_us_may_be_broken(folder: Path) -> Non
     assert json.loads(run("hole.stl", "--json", cwd=folder / "sub").stdout)["config"] == "pyproject.toml"
 
 
-def test_unitcad_toml_comes_before_pyproject(folder: Path) -> None:
+def test_unitcad_toml_comes_before_pyproject(folder):
     (folder / "unitcad.toml").write_text("[check]\n")
     (folder / "pyproject.toml").write_text('[tool.unitcad.check]\nfail-on = "warning"\n')
     assert json.loads(run("sub/warn.stl", "--json", cwd=folder).stdout)["config"] == "unitcad.toml"
     assert run("sub/warn.stl", cwd=folder).returncode == 0
 
 
-def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folder: Path) -> None:
-    def both(setting: str, file: str, *beaten: str) -> tuple[CompletedProcess, CompletedProcess]:
+def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folder):
+    def both(setting, file, *beaten):
         (folder / "unitcad.toml").write_text(f"[check]\n{setting}\n")
         return run(file, "--json", cwd=folder), run(file, "--json", *beaten, cwd=folder)
 
@@ -96,7 +93,7 @@ def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folde
     assert run("sub/deep/film.stl", "--no-config", cwd=folder).returncode == 0
 
 
-def test_3mf_strict_in_settings(folder: Path) -> None:
+def test_3mf_strict_in_settings(folder):
     thumbnail = '<metadata name="odd">x</metadata>'
     from shapes import model_xml
 
@@ -113,13 +110,13 @@ def test_3mf_strict_in_settings(folder: Path) -> None:
     [("sub/*.stl", True), ("sub/hole.stl", True), ("hole.stl", True), ("ho*", True), ("*.3mf", False), ("su?", False),
      ("*/hole.stl", True), ("deep/*", False), ("sub/deep/*", False)],
 )  # fmt: skip
-def test_per_file_ignores_are_globs_from_the_files_folder(folder: Path, pattern: str, ignored: bool) -> None:
+def test_per_file_ignores_are_globs_from_the_files_folder(folder, pattern, ignored):
     (folder / "unitcad.toml").write_text(f'[check]\nselect = ["T001"]\nper-file-ignores = {{ "{pattern}" = ["T"] }}\n')
     for here, name in ((folder, "sub/hole.stl"), (folder / "sub" / "deep", "../hole.stl")):
         assert codes(run(name, "--json", cwd=here)) == {"hole.stl": [] if ignored else ["T001"]}
 
 
-def test_per_file_ignores_hide_no_file_that_was_not_judged(folder: Path) -> None:
+def test_per_file_ignores_hide_no_file_that_was_not_judged(folder):
     (folder / "cut.stl").write_bytes(HOLE[:-80])
     (folder / "unitcad.toml").write_text('[check.per-file-ignores]\n"*" = ["F", "T", "G"]\n')
     assert run("cut.stl", cwd=folder).returncode == 1
@@ -153,7 +150,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("content", "said", "near"), BAD)
-def test_a_wrong_setting_is_one_clear_error(folder: Path, content: str, said: str, near: str) -> None:
+def test_a_wrong_setting_is_one_clear_error(folder, content, said, near):
     (folder / "unitcad.toml").write_text(content)
     result = run("sub/warn.stl", cwd=folder)
     assert result.returncode == 2
@@ -164,7 +161,7 @@ def test_a_wrong_setting_is_one_clear_error(folder: Path, content: str, said: st
     assert run("sub/warn.stl", "--no-config", cwd=folder).returncode == 0
 
 
-def test_config_names_a_file_and_no_config_reads_none(folder: Path) -> None:
+def test_config_names_a_file_and_no_config_reads_none(folder):
     (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
     (folder / "strict.toml").write_text('[check]\nfail-on = "warning"\n[other]\nkey = 1\n')
     (folder / "empty.toml").write_text("")
@@ -177,7 +174,7 @@ def test_config_names_a_file_and_no_config_reads_none(folder: Path) -> None:
         assert (result.returncode, len(result.stderr.splitlines())) == (2, 1)
 
 
-def test_the_settings_printer_counts_as_named_with_a_manifest(folder: Path) -> None:
+def test_the_settings_printer_counts_as_named_with_a_manifest(folder):
     part = {"name": "film", "role": "tool", "volume_mm3": 140.0, "files": {"stl": {"path": "sub/deep/film.stl"}}}
     (folder / "manifest.json").write_text(json.dumps({"parts": [part], "printer": "sla"}))
     assert "D001" not in codes(run("--manifest", ".", "--json", cwd=folder))["film.stl"]

@@ -1,7 +1,5 @@
 """Signs of determinants against fractions, kind by kind, and which arithmetic decides them."""
 
-from __future__ import annotations
-
 import random
 from fractions import Fraction
 
@@ -14,17 +12,17 @@ from unitcad.meshcheck.geometry.predicates import orient2d, orient3d
 N = 600
 
 
-def _spread(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
+def _spread(rng, low, high):
     return rng.normal(size=(4, N, 3)) * 10.0 ** rng.uniform(low, high, (4, N, 3))
 
 
-def _flat(rng: np.random.Generator, p: np.ndarray) -> np.ndarray:
+def _flat(rng, p):
     """The fourth point in the plane of the others, to rounding."""
     p[3] = p[0] + rng.normal(size=(N, 1)) * (p[1] - p[0]) + rng.normal(size=(N, 1)) * (p[2] - p[0])
     return p
 
 
-def _points(kind: str, rng: np.random.Generator) -> np.ndarray:
+def _points(kind, rng):
     p = rng.normal(size=(4, N, 3))
     if kind == "slivers":
         p[1:] = p[0] + rng.normal(size=(3, N, 1)) * (p[1] - p[0])
@@ -73,7 +71,7 @@ KINDS = [
 
 @pytest.mark.parametrize("single", [False, True], ids=["float64", "float32"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_signs_are_those_of_fractions(kind: str, single: bool) -> None:
+def test_signs_are_those_of_fractions(kind, single):
     p = _points(kind, np.random.default_rng(8))
     if single:
         p = p.astype(np.float32).astype(np.float64)
@@ -91,11 +89,11 @@ def test_signs_are_those_of_fractions(kind: str, single: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", ["slivers", "on a plane of short numbers"])
-def test_numbers_of_single_precision_need_no_integers_of_python(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_numbers_of_single_precision_need_no_integers_of_python(kind, monkeypatch):
     """They cost ten times as much as the rest, and most mesh files have single precision."""
     rows = 0
 
-    def counted(values: np.ndarray) -> np.ndarray:
+    def counted(values):
         nonlocal rows
         rows += values.shape[-1]
         return whole(values)
@@ -107,7 +105,7 @@ def test_numbers_of_single_precision_need_no_integers_of_python(kind: str, monke
     assert rows == 0
 
 
-def _next_to_parallel(seed: int) -> tuple[list[int], int]:
+def _next_to_parallel(seed):
     """Whole numbers p, q, r, s of 40 bits and their determinant p s - q r, which is -1, 0 or 1."""
     rng = random.Random(seed)
     q = rng.getrandbits(40) | (1 << 39) | 1
@@ -122,7 +120,7 @@ def _next_to_parallel(seed: int) -> tuple[list[int], int]:
 
 
 @pytest.mark.parametrize("power", [-20, 0, 300])
-def test_products_that_agree_in_all_but_the_last_bit(power: int) -> None:
+def test_products_that_agree_in_all_but_the_last_bit(power):
     drawn = [_next_to_parallel(seed) for seed in range(500)]
     corner = np.random.default_rng(1).integers(-(2**38), 2**38, (500, 2))
     a = np.array([numbers[:2] for numbers, _ in drawn]) + corner

@@ -1,13 +1,11 @@
 """How programs write numbers and texts: not-a-number in each format, UTF-16, values of a wrong type, huge settings."""
 
-from __future__ import annotations
-
 import codecs
 
 import numpy as np
 import pytest
 from polygon_files import off, ply
-from shapes import CUBE_CORNERS, CUBE_FACES, Judge, box, mesh_xml, model_xml, obj, package, text_stl
+from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, obj, package, text_stl
 
 from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.readers.threemf_schema import CORE, ELEMENTS, MATERIAL
@@ -35,10 +33,10 @@ TEXTS = {
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
 @pytest.mark.parametrize("name", [*TEXTS, "a.3mf"])
-def test_every_spelling_of_not_a_number_is_one(name: str, spelling: str, judge: Judge) -> None:
+def test_every_spelling_of_not_a_number_is_one(name, spelling, judge):
     """In each format the same coordinate is replaced."""
     if name == "a.3mf":
-        content: bytes | str = package(model_xml().replace('z="10"', f'z="{spelling}"', 1))
+        content = package(model_xml().replace('z="10"', f'z="{spelling}"', 1))
     else:
         lines = TEXTS[name].split("\n")
         line = next(i for i, text in enumerate(lines) if text.replace("vertex ", "v ").split()[-3:] == ["0", "0", "7"])
@@ -48,14 +46,14 @@ def test_every_spelling_of_not_a_number_is_one(name: str, spelling: str, judge: 
 
 
 @pytest.mark.parametrize("comment", ["#INF", " # 1.#IND", "#1.#QNAN"])
-def test_a_comment_is_one_where_it_was(comment: str, judge: Judge) -> None:
+def test_a_comment_is_one_where_it_was(comment, judge):
     content = TEXTS["a.obj"].replace("v 0 0 7", f"v 0 0 7{comment}", 1)
     assert judge(content, "a.obj").findings == ()
 
 
 @pytest.mark.parametrize("mark", [codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE])
 @pytest.mark.parametrize("name", TEXTS)
-def test_utf_16_is_read_with_a_warning(name: str, mark: bytes, judge: Judge) -> None:
+def test_utf_16_is_read_with_a_warning(name, mark, judge):
     order = "utf-16-le" if mark == codecs.BOM_UTF16_LE else "utf-16-be"
     report = judge(mark + TEXTS[name].encode(order), name)
     assert [found.code for found in report.findings] == ["F009"]
@@ -74,9 +72,7 @@ OPTIONAL = [
 
 
 @pytest.mark.parametrize(("space", "element", "name"), OPTIONAL, ids=lambda value: value.rpartition("/")[2])
-def test_an_optional_attribute_of_a_wrong_type_is_reported_and_left_out(
-    space: str, element: str, name: str, judge: Judge
-) -> None:
+def test_an_optional_attribute_of_a_wrong_type_is_reported_and_left_out(space, element, name, judge):
     prefix = "" if space == CORE else "m:"
     needed = {"id": "7", "name": "a", "path": "/a.png", "contenttype": "image/png", "texid": "9", "matid": "5"}
     needed |= {"matindices": "0", "pids": "5", "x": "0", "y": "0", "z": "0", "objectid": "1", "displaycolor": "#FF0000"}
@@ -109,7 +105,7 @@ def test_an_optional_attribute_of_a_wrong_type_is_reported_and_left_out(
         '<m:multiproperties id="8" pids="5"><s:vertex x="1" y="1"/></m:multiproperties>',
     ],
 )
-def test_strange_resources_are_judged(resources: str, judge: Judge) -> None:
+def test_strange_resources_are_judged(resources, judge):
     found = judge(
         package(model_xml(f'{BASE}{resources.format(huge="9" * 5000)}<object id="1">{mesh_xml()}</object>')), "a.3mf"
     )
@@ -117,7 +113,7 @@ def test_strange_resources_are_judged(resources: str, judge: Judge) -> None:
 
 
 @pytest.mark.parametrize("size", [1e38, 3e38])
-def test_sizes_near_the_largest_give_no_warnings_of_overflow(size: float) -> None:
+def test_sizes_near_the_largest_give_no_warnings_of_overflow(size):
     """A flat mesh, whose third axis has no extent, beside the largest float32 numbers; warnings are errors here."""
     corners = np.array([[0, 0, 0], [size, 0, 0], [0, size, 0], [1e-45, 1e-45, 0]])
     assert check_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])).verdict == "error"

@@ -1,7 +1,5 @@
 """STEP: judged where a B-rep extra is installed, refused with a clear message where none is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -11,7 +9,7 @@ from unitcad.meshcheck import Limits, Options, check_file, file_checks
 from unitcad.meshcheck.readers import read_step
 
 
-def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extra_the_message_says_what_to_install(tmp_path, monkeypatch):
     path = tmp_path / "a.step"
     path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
     monkeypatch.setattr(read_step, "find_spec", lambda name: None)
@@ -22,9 +20,7 @@ def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monk
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_step_in_a_folder_is_a_warning_without_the_extra(
-    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_step_in_a_folder_is_a_warning_without_the_extra(there, tmp_path, monkeypatch):
     (tmp_path / "a.STEP").write_text("x")
     (tmp_path / "b.stl").write_text("x")
     monkeypatch.setattr(read_step, "find_spec", lambda name: there or None)
@@ -37,13 +33,13 @@ def test_step_in_a_folder_is_a_warning_without_the_extra(
 @pytest.mark.parametrize(
     ("text", "code"), [("", "F001"), ("solid a", "F005"), ("ISO-10303-21;\nHEADER;", "F003"), ("<html>", "F005")]
 )
-def test_what_is_no_step_file(text: str, code: str, tmp_path: Path) -> None:
+def test_what_is_no_step_file(text, code, tmp_path):
     path = tmp_path / "a.step"
     path.write_text(text)
     assert [found.code for found in check_file(path).findings] == [code]
 
 
-def test_solids_volume_and_box(tmp_path: Path) -> None:
+def test_solids_volume_and_box(tmp_path):
     pytest.importorskip("OCP")
     from OCP.BRep import BRep_Builder
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
@@ -70,9 +66,7 @@ def test_solids_volume_and_box(tmp_path: Path) -> None:
     assert check_file(cut).has("F003")
 
 
-def test_a_reader_that_dies_or_prints_is_a_finding(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reader_that_dies_or_prints_is_a_finding(tmp_path, monkeypatch, capfd):
     path = tmp_path / "a.step"
     path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
     monkeypatch.setattr(read_step, "find_spec", lambda name: True)
@@ -91,7 +85,7 @@ def test_a_reader_that_dies_or_prints_is_a_finding(
     assert capfd.readouterr().out == ""
 
 
-def test_damaged_step_files_give_a_verdict_and_print_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_step_files_give_a_verdict_and_print_nothing(tmp_path, capfd):
     pytest.importorskip("OCP")
     path = tmp_path / "a.step"
     path.write_text(

@@ -1,7 +1,5 @@
 """A file whose time runs out: everything that was found by then is reported, with F011 beside it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES, finding, mesh_xml, model_xml, package, stl
@@ -9,13 +7,13 @@ from shapes import CUBE_CORNERS, CUBE_FACES, finding, mesh_xml, model_xml, packa
 from unitcad.catalogue import printers
 from unitcad.geometry import boxes
 from unitcad.meshcheck import check_bytes
-from unitcad.meshcheck.findings import Facts, FileReport
+from unitcad.meshcheck.findings import Facts
 from unitcad.meshcheck.geometry import crossings
 from unitcad.meshcheck.rules.f_file import Deadline, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.inspection import Options
 
 
-def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
+def _open_and_crossing():
     """A cube without one face, and beside it twelve bars, each of which pierces a cube."""
     corners, faces = [CUBE_CORNERS * 10], [CUBE_FACES[1:]]
     for k in range(12):
@@ -26,28 +24,28 @@ def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(corners), np.concatenate(faces)
 
 
-def _stl() -> bytes:
+def _stl():
     points, faces = _open_and_crossing()
     return stl(points[faces])
 
 
-def _threemf() -> bytes:
+def _threemf():
     points, faces = _open_and_crossing()
     objects = f'<object id="1">{mesh_xml()}</object><object id="2">{mesh_xml(points, faces)}</object>'
     return package(model_xml(objects, '<build><item objectid="1"/><item objectid="2"/></build>'))
 
 
 @pytest.fixture
-def stopped(monkeypatch: pytest.MonkeyPatch):
+def stopped(monkeypatch):
     """Judge `data` with a clock that runs out at its n-th look."""
     monkeypatch.setattr(crossings, "_BLOCK", 100)
     monkeypatch.setattr(boxes, "_STEP_BITS", 4)
     monkeypatch.setattr(boxes, "_STEP", 16)
 
-    def judge(data: bytes, name: str, looks: int, options: Options) -> FileReport:
+    def judge(data, name, looks, options):
         left = looks
 
-        def tick(clock: Deadline) -> None:
+        def tick(clock):
             nonlocal left
             left -= 1
             if left < 0:
@@ -61,12 +59,12 @@ def stopped(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
 @pytest.mark.parametrize("printer", [False, True], ids=["mesh rules", "and a printer's"])
-def test_what_was_found_is_reported_and_never_lost_again(name: str, printer: bool, stopped) -> None:
+def test_what_was_found_is_reported_and_never_lost_again(name, printer, stopped):
     data = _stl() if name == "a.stl" else _threemf()
     options = Options(printer=printers()["fdm-0.4"] if printer else None)
     whole = {item.code: item for item in stopped(data, name, 10**9, options).findings}
     assert {"T001", "G001"} <= set(whole)
-    reached: dict[str, int] = {}
+    reached = {}
     crossings, looks = [0], 0
     while True:
         report = stopped(data, name, looks, options)
@@ -87,7 +85,7 @@ def test_what_was_found_is_reported_and_never_lost_again(name: str, printer: boo
     assert report.findings == tuple(whole.values())
 
 
-def test_facts_that_were_known_are_reported(stopped) -> None:
+def test_facts_that_were_known_are_reported(stopped):
     whole = stopped(_stl(), "a.stl", 10**9, Options())
     assert stopped(_stl(), "a.stl", 0, Options()).facts == Facts()
     known = [stopped(_stl(), "a.stl", looks, Options()).facts for looks in range(2, 20)]
@@ -95,13 +93,13 @@ def test_facts_that_were_known_are_reported(stopped) -> None:
     assert known[-1].area_mm2 == whole.facts.area_mm2
 
 
-def test_filters_drop_what_was_found_but_not_the_limit(stopped) -> None:
+def test_filters_drop_what_was_found_but_not_the_limit(stopped):
     report = stopped(_stl(), "a.stl", 30, Options(ignore=("T", "F", "G")))
     assert [item.code for item in report.findings] == ["F011"]
 
 
-def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
+def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch):
+    def fails(*_):
         raise MemoryError
 
     monkeypatch.setattr(crossings, "_decide", fails)
@@ -111,7 +109,7 @@ def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch: pytest.MonkeyPatch
     assert "out of memory" in finding(report, "F011").message
 
 
-def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch, tmp_path):
     import signal
     import time
 

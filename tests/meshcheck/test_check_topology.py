@@ -1,7 +1,5 @@
 """Edges, shells and welds against plain Python on random meshes."""
 
-from __future__ import annotations
-
 import sys
 from collections import defaultdict
 
@@ -18,7 +16,7 @@ from unitcad.meshcheck.geometry import topology
 from unitcad.meshcheck.geometry.mesh import weld_exact
 
 
-def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
+def _random_faces(seed, n_vertices, n_faces):
     rng = np.random.default_rng(seed)
     faces = rng.integers(0, n_vertices, (n_faces * 2, 3)).astype(np.int32)
     keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
@@ -26,7 +24,7 @@ def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_edges_are_counted_as_a_dictionary_counts_them(seed: int) -> None:
+def test_edges_are_counted_as_a_dictionary_counts_them(seed):
     faces = _random_faces(seed, 12, 20)
     ends, counted = np.unique(np.sort(np.stack(topology.half_edges(faces)), axis=0), axis=1, return_counts=True)
     edges = topology.edges_of(faces, 12)
@@ -36,7 +34,7 @@ def test_edges_are_counted_as_a_dictionary_counts_them(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("n_vertices", "n_faces"), [(12, 0), (12, 20), (90, 4000), (70_000, 60_000)])
-def test_edges_are_sorted_by_their_ends(n_vertices: int, n_faces: int) -> None:
+def test_edges_are_sorted_by_their_ends(n_vertices, n_faces):
     faces = _random_faces(1, n_vertices, n_faces)
     start, end = topology.half_edges(faces)
     low, high = np.minimum(start, end), np.maximum(start, end)
@@ -49,7 +47,7 @@ def test_edges_are_sorted_by_their_ends(n_vertices: int, n_faces: int) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 5, 300, 70_000])
-def test_components_as_a_search_finds_them(n: int) -> None:
+def test_components_as_a_search_finds_them(n):
     rng = np.random.default_rng(n)
     left, right = rng.integers(0, n, (2, n // 2 + 1))
     label = components(n, left, right)
@@ -58,7 +56,7 @@ def test_components_as_a_search_finds_them(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", [200, 600])
-def test_near_points_are_those_of_all_pairs_and_a_crowd_has_none(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_near_points_are_those_of_all_pairs_and_a_crowd_has_none(n, monkeypatch):
     """Few points need no scipy, which takes longer to load than they take."""
     rng = np.random.default_rng(n)
     points = np.concatenate([some := rng.random((n, 3)) * 100, some + rng.normal(size=some.shape) * 1e-4])
@@ -74,7 +72,7 @@ def test_near_points_are_those_of_all_pairs_and_a_crowd_has_none(n: int, monkeyp
 
 
 @pytest.mark.parametrize("collisions", [False, True])
-def test_weld_joins_equal_corners_only_in_their_order(collisions: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weld_joins_equal_corners_only_in_their_order(collisions, monkeypatch):
     if collisions:
         monkeypatch.setattr("unitcad.meshcheck.geometry.mesh._mix", lambda bits: bits[:, 0].astype(np.uint64) % 3)
     rng = np.random.default_rng(0)
@@ -85,7 +83,7 @@ def test_weld_joins_equal_corners_only_in_their_order(collisions: bool, monkeypa
     assert (vertices[faces] == corners).all()
 
 
-def _pinched_by_search(faces: list[list[int]]) -> list[int]:
+def _pinched_by_search(faces):
     """Vertices of which the faces are in several parts, joined across edges of two; without edges of more."""
     by_edge, at = defaultdict(list), defaultdict(set)
     for n, face in enumerate(faces):
@@ -107,7 +105,7 @@ def _pinched_by_search(faces: list[list[int]]) -> list[int]:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_pinches_of_open_meshes_as_a_search_finds_them(seed: int) -> None:
+def test_pinches_of_open_meshes_as_a_search_finds_them(seed):
     rng = np.random.default_rng(seed)
     faces = np.concatenate([CUBE_FACES + 8 * n for n in range(5)])
     joined = np.arange(40)
@@ -122,13 +120,13 @@ def test_pinches_of_open_meshes_as_a_search_finds_them(seed: int) -> None:
     assert found.tolist() == _pinched_by_search(faces.tolist())
 
 
-def test_indices_out_of_range_and_empty() -> None:
+def test_indices_out_of_range_and_empty():
     assert check_mesh(CUBE_CORNERS, CUBE_FACES + 1).has("P011")
     assert check_mesh(CUBE_CORNERS, np.empty((0, 3))).has("F001")
     assert check_mesh(CUBE_CORNERS * np.nan, CUBE_FACES).has("V001")
 
 
-def _labelled(cells: np.ndarray, steps: int) -> np.ndarray:
+def _labelled(cells, steps):
     """Components of cells; neighbours differ in up to `steps` coordinates."""
     found = np.zeros(cells.shape, int)
     ndimage.label(cells, ndimage.generate_binary_structure(3, steps), output=found)
@@ -136,7 +134,7 @@ def _labelled(cells: np.ndarray, steps: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_shells_of_cubes_that_touch_in_edges(seed: int) -> None:
+def test_shells_of_cubes_that_touch_in_edges(seed):
     """Cubes joined by faces are one solid; each of its shells parts it from what lies together outside of it."""
     rng = np.random.default_rng(seed)
     solid = rng.random((4, 4, 4)) < (0.35 if seed % 2 else 0.65)
@@ -152,13 +150,13 @@ def test_shells_of_cubes_that_touch_in_edges(seed: int) -> None:
         assert report.facts.shells == expected
 
 
-def _turned_diagonals(triangles: np.ndarray) -> np.ndarray:
+def _turned_diagonals(triangles):
     pairs = triangles.reshape(-1, 2, 3, 3)
     a, b, c, d = pairs[:, 0, 0], pairs[:, 0, 1], pairs[:, 0, 2], pairs[:, 1, 2]
     return np.stack([np.stack([a, b, d], axis=1), np.stack([b, c, d], axis=1)], axis=1).reshape(-1, 3, 3)
 
 
-def test_four_faces_at_an_edge_that_do_not_all_agree_are_wound_wrongly(judge) -> None:
+def test_four_faces_at_an_edge_that_do_not_all_agree_are_wound_wrongly(judge):
     """Two cubes that meet along an edge, one face there turned over: its other two edges say so, and this one too."""
     cubes = np.concatenate([box(), box(at=(10, 10, 0))])
     upright = (cubes[:, :, :2] == 10).all(axis=2).sum(axis=1) == 2
@@ -193,9 +191,7 @@ _FOUR = [box(), _BESIDE, box(at=(0, 10, 0)), box(at=(10, 10, 0))]
          "one inverted", "twice", "hollow without a wall", "one open", "two and its copy", "a face over",
          "a fin"],
 )  # fmt: skip
-def test_shells_that_share_edges_are_told_apart_and_share_no_duplicates(
-    parts: list[np.ndarray], shells: int | None, duplicates: int, judge
-) -> None:
+def test_shells_that_share_edges_are_told_apart_and_share_no_duplicates(parts, shells, duplicates, judge):
     content = stl(np.concatenate(parts))
     report = judge(content)
     assert sum(found.count for found in report.findings if found.code == "T009") == duplicates

@@ -1,7 +1,5 @@
 """Rays from faces against every triangle by Moeller and Trumbore's intersection, without boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,20 +12,18 @@ from unitcad.meshcheck.geometry.topology import topology_of
 FLOORS, LEAST = (0.8, 0.5), 0.4
 
 
-def slotted(gap: float) -> Manifold:
+def slotted(gap):
     """Draw a block with a slot, a thin wall and a pin."""
     block = Manifold.cube((6, 4, 3)) - Manifold.cube((gap, 5, 2)).translate((2, -0.5, 1))
     return block - Manifold.cube((1, 5, 2)).translate((2 + gap + 0.3, -0.5, 1)) + Manifold.cylinder(5, 0.15, 0.1, 12)
 
 
-def fan(gap: float) -> Manifold:
+def fan(gap):
     """Draw a tube of slivers whose boxes all meet once it is turned."""
     return Manifold.cylinder(8, 3, 3, 90) - Manifold.cylinder(10, 3 - gap, 3 - gap, 90).translate((0, 0, -1))
 
 
-def by_brute_force(
-    mesh: Mesh, points: np.ndarray, owners: np.ndarray, reach: np.ndarray, side: int
-) -> tuple[np.ndarray, np.ndarray]:
+def by_brute_force(mesh, points, owners, reach, side):
     """Return `thickness` and `behind` of points on faces, mm."""
     corners = mesh.vertices[mesh.faces[:, ::side]]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -56,7 +52,7 @@ def by_brute_force(
     angles=st.tuples(*[st.sampled_from([0.0, 17.0, 41.0, 90.0])] * 3),
     side=st.sampled_from([1, -1]),
 )
-def test_rays_find_what_lies_across(drawn, gap: float, angles, side: int) -> None:
+def test_rays_find_what_lies_across(drawn, gap, angles, side):
     solid = drawn(gap).rotate(angles).to_mesh64()
     mesh = Mesh(np.ascontiguousarray(solid.vert_properties), np.ascontiguousarray(solid.tri_verts, np.int32))
     found = rays.cast(topology_of(mesh, lambda: None), FLOORS, LEAST, lambda: None, side=side)

@@ -1,7 +1,5 @@
 """Stars that are taken for height fields: no two of their faces cross, by fractions."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np
@@ -12,7 +10,7 @@ from unitcad.meshcheck.geometry import sieves
 from unitcad.meshcheck.geometry.mesh import area_vectors
 
 
-def _star(rng: np.random.Generator, rounds: int, fold: bool, rough: float) -> np.ndarray:
+def _star(rng, rounds, fold, rough):
     """Neighbours of the origin in their order: so many rounds, folded by a right angle along an axis or not, rough."""
     angles = np.sort(rng.random(rng.integers(3, 9) * rounds)) * 2 * np.pi * rounds
     flat = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * rng.uniform(0.2, 1.0, (len(angles), 1))
@@ -23,7 +21,7 @@ def _star(rng: np.random.Generator, rounds: int, fold: bool, rough: float) -> np
     return points[:, rng.permutation(3)] * rng.choice([-1.0, 1.0], 3)
 
 
-def _asked(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _asked(points):
     """The columns of the origin and its neighbours, the corners of the faces, and twice their area vectors."""
     vertices = np.concatenate([np.zeros((1, 3)), points])
     around = np.arange(1, len(vertices))
@@ -35,7 +33,7 @@ def _asked(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("rounds", [1, 2])
 @pytest.mark.parametrize("fold", [False, True])
 @pytest.mark.parametrize("rough", [0.0, 0.05, 0.4])
-def test_faces_of_a_height_field_do_not_cross(rounds: int, fold: bool, rough: float) -> None:
+def test_faces_of_a_height_field_do_not_cross(rounds, fold, rough):
     rng, taken = np.random.default_rng(3), 0
     for _ in range(150):
         columns, corners, areas = _asked(_star(rng, rounds, fold, rough))

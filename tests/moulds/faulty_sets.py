@@ -1,8 +1,5 @@
 """Mould sets of templates, and ways to plant a fault in one."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
 
 from unitcad.checks import check_moulds
@@ -11,29 +8,28 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
 from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape import Shape
-from unitcad.spec import Spec, printer_of
+from unitcad.spec import printer_of
 from unitcad.validation import load
 
 
-def set_of(source: str, *overrides: str) -> MouldSet:
+def set_of(source, *overrides):
     """Return the mould set of a template or a spec file."""
     return of_spec(load(source, overrides))
 
 
-def of_spec(spec: Spec) -> MouldSet:
+def of_spec(spec):
     """Return the mould set of a spec, its plan made. Raises Refusal where the moulds can't be."""
     moulds = MouldSet(spec)
     _ = moulds.plan
     return moulds
 
 
-def broken(moulds: MouldSet) -> set[str]:
+def broken(moulds):
     """Return the codes of the checks that a set breaks."""
     return {finding.code for finding in check_moulds(moulds) if not finding.ok}
 
 
-def mesh_findings(moulds: MouldSet) -> list[str]:
+def mesh_findings(moulds):
     """Return what the mesh rules find in the bodies and the pieces of a set, as they are written to STL."""
     findings = []
     for body in (*moulds.unit, *moulds.plan.pieces):
@@ -44,14 +40,14 @@ def mesh_findings(moulds: MouldSet) -> list[str]:
     return findings
 
 
-def with_fault(moulds: MouldSet, name: str, change: Callable[[Shape], Shape]) -> MouldSet:
+def with_fault(moulds, name, change):
     """Return the set with one tool drawn otherwise."""
     plan = moulds.plan
     tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
     return MouldSet(moulds.spec, replace(plan, tools=tools))
 
 
-def without(moulds: MouldSet, name: str) -> MouldSet:
+def without(moulds, name):
     """Return the set with a tool forgotten on the bench."""
     plan = moulds.plan
     steps = tuple(replace(step, tools=tuple(tool for tool in step.tools if tool != name)) for step in plan.steps)

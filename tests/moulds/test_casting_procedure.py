@@ -1,13 +1,9 @@
 """The procedure: its figures against closed forms and published numbers, its words against what the mould has."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,20 +15,16 @@ from unitcad.casting import figures, pouring, procedure_text
 from unitcad.casting import procedure as casting_procedure
 from unitcad.casting.figures import off_grid, unit_heights
 from unitcad.casting.pouring import Face
-from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import BenchStep, number_steps
+from unitcad.casting.steps import number_steps
 from unitcad.catalogue import materials
-from unitcad.designs.dimensions import Exit
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cup import window_section
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
-from unitcad.spec import Spec
 from unitcad.text import number
 from unitcad.validation import load, templates
 
 
-def procedure(*source: str) -> Procedure:
+def procedure(*source):
     moulds = set_of(*source)
     solids = moulds.solids
     volumes = [solids[step.name].volume() for step in moulds.plan.steps]
@@ -40,7 +32,7 @@ def procedure(*source: str) -> Procedure:
     return casting_procedure.procedure(moulds, volumes, printed)
 
 
-def texts(steps: tuple[BenchStep, ...]) -> list[str]:
+def texts(steps):
     return [step.text for step in steps]
 
 
@@ -49,14 +41,14 @@ RISE_S = {"ecoflex-00-10": 2075, "ecoflex-00-50": 1152, "dragon-skin-10-medium":
 
 
 @pytest.mark.parametrize(("name", "seconds"), RISE_S.items())
-def test_bubble_rise(name: str, seconds: float) -> None:
+def test_bubble_rise(name, seconds):
     silicone = materials()[name]
     assert figures.bubble_rise_s(3.36, silicone) == pytest.approx(seconds, rel=1e-3)
     assert figures.bubble_rise_s(3.36, silicone, 0.4) == pytest.approx(seconds / 4, rel=1e-3)
     assert seconds > 60 * float(silicone.pot_life_min)
 
 
-def test_only_ecoflex_00_30_clears_without_a_vacuum() -> None:
+def test_only_ecoflex_00_30_clears_without_a_vacuum():
     """445 s of rise in a quarter of 45 min; the next best needs more than half of its pot life."""
     for name in materials():
         pour = procedure("encapsulating", f"layers.0.material={name}", "casting.vacuum=false").pours[0]
@@ -66,13 +58,13 @@ def test_only_ecoflex_00_30_clears_without_a_vacuum() -> None:
 
 
 @pytest.mark.parametrize("name", materials())
-def test_what_there_is_a_vacuum_for_is_degassed(name: str) -> None:
+def test_what_there_is_a_vacuum_for_is_degassed(name):
     pour = procedure("encapsulating", f"layers.0.material={name}").pours[0]
     assert pour.verdict.startswith("Degas for 3 min")
     assert pour.verdict in texts(pour.steps)
 
 
-def test_allowance_is_a_quarter_of_the_pot_life() -> None:
+def test_allowance_is_a_quarter_of_the_pot_life():
     """Ecoflex 00-30 rises 2 mm in 265 s: a quarter of 45 min is 675 s, at 41 degC 194 s."""
     cold, hot = (
         procedure("embedded", "layers.0.material=ecoflex-00-30", "casting.vacuum=false", f"casting.room_c={c}").pours[0]
@@ -82,7 +74,7 @@ def test_allowance_is_a_quarter_of_the_pot_life() -> None:
     assert "3.2 min, a quarter of the pot life, are allowed. Such bubbles stay" in hot.verdict
 
 
-def test_not_degassing_breaks_a_rule() -> None:
+def test_not_degassing_breaks_a_rule():
     """Planted: the step left out, the time left out, and a vacuum asked for that is not there."""
     casting = procedure("encapsulating")
     first, *more = casting.pours
@@ -98,7 +90,7 @@ def test_not_degassing_breaks_a_rule() -> None:
     assert without[-1].startswith("the bill asks")
 
 
-def test_nothing_of_a_vacuum_is_said_without_one() -> None:
+def test_nothing_of_a_vacuum_is_said_without_one():
     files = procedure_text.files(procedure("encapsulating", "casting.vacuum=false"))
     for text in (files["casting.md"], files["bom.csv"]):
         assert "inHg" not in text
@@ -107,7 +99,7 @@ def test_nothing_of_a_vacuum_is_said_without_one() -> None:
 
 
 @pytest.mark.parametrize(("name", "grams"), [("embedded", (0.086, 0.107)), ("encapsulating", (0.228, 0.384))])
-def test_grams_of_the_paper_units(name: str, grams: tuple[float, float]) -> None:
+def test_grams_of_the_paper_units(name, grams):
     """At 1.07 g/cm3; the volumes in closed form, less the slot where there is one."""
     same = [f"layers.{i}.material=dragon-skin-10-medium" for i in range(2)]
     for pour, expected in zip(procedure(name, *same).pours, grams, strict=True):
@@ -115,7 +107,7 @@ def test_grams_of_the_paper_units(name: str, grams: tuple[float, float]) -> None
         assert net == pytest.approx(expected, abs=6e-4)
 
 
-def test_a_scale_of_a_hundredth_of_a_gram_is_3_to_12_percent_wrong() -> None:
+def test_a_scale_of_a_hundredth_of_a_gram_is_3_to_12_percent_wrong():
     errors = [
         next(f.value for f in pour.figures if f.name == "scale's error on a part, net")
         for name in ("embedded", "encapsulating")
@@ -125,7 +117,7 @@ def test_a_scale_of_a_hundredth_of_a_gram_is_3_to_12_percent_wrong() -> None:
     assert max(errors) == pytest.approx(11.9, abs=0.2)
 
 
-def test_mix_covers_waste_and_least_batch() -> None:
+def test_mix_covers_waste_and_least_batch():
     spec = set_of("encapsulating", "casting.waste=0.25", "casting.minimum_mix_g=0.1").spec
     mix = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0)
     assert mix.mix_g == pytest.approx(1.07 * 1.25)
@@ -133,13 +125,13 @@ def test_mix_covers_waste_and_least_batch() -> None:
     assert mix.mix_error_pct == pytest.approx(100 * 0.005 / mix.part_a_g)
 
 
-def test_play_moves_walls() -> None:
+def test_play_moves_walls():
     spec = set_of("encapsulating").spec
     assert figures.wall_range(spec, 0, 0.15) == pytest.approx((1.10, 1.40))
     assert figures.wall_range(spec, 1, 0.15) == pytest.approx((0.95, 1.55))
 
 
-def test_weep_goes_with_the_cube_of_the_clearance() -> None:
+def test_weep_goes_with_the_cube_of_the_clearance():
     one, two = (
         set_of("encapsulating", f"moulds.window_clearance_mm={c}", "moulds.layer_mm=0.005") for c in (0.05, 0.1)
     )
@@ -150,13 +142,13 @@ def test_weep_goes_with_the_cube_of_the_clearance() -> None:
     assert figures.weep_mm3(closed, closed.plan.steps[0], silicone) == 0
 
 
-def test_cure_follows_the_room() -> None:
+def test_cure_follows_the_room():
     assert figures.at_room(4.0, 23) == 4.0
     assert figures.at_room(4.0, 33) == 2.0
 
 
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_every_figure_has_a_source(name: str) -> None:
+def test_every_figure_has_a_source(name):
     casting = procedure(name)
     for figure in (*casting.walls, *(f for pour in casting.pours for f in pour.figures)):
         known = "datasheet: |paper: |secondary: |computed: |assumed: |spec: |mix ratio, |half of "
@@ -171,7 +163,7 @@ def test_every_figure_has_a_source(name: str) -> None:
     assert ("no release agent on it, ever" in text) == (len(plan.steps) > 1)
 
 
-def test_numbers_run_through_the_whole_text() -> None:
+def test_numbers_run_through_the_whole_text():
     lines = procedure_text.to_markdown(procedure("three-layer")).splitlines()
     numbers = [int(line.split(".")[0]) for line in lines if line.split(".")[0].isdigit()]
     assert numbers == list(range(1, len(numbers) + 1))
@@ -187,11 +179,11 @@ def test_numbers_run_through_the_whole_text() -> None:
         (["encapsulating", "moulds.printer=sla"], 1800),
     ],
 )
-def test_a_sheet_has_no_more_words_than_a_maker_reads(source: list[str], most: int) -> None:
+def test_a_sheet_has_no_more_words_than_a_maker_reads(source, most):
     assert len(procedure_text.files(procedure(*source))["casting.md"].split()) <= most
 
 
-def test_a_sentence_that_an_earlier_pour_has_is_said_once() -> None:
+def test_a_sentence_that_an_earlier_pour_has_is_said_once():
     """Every step of a later pour refers to one that has its words; together they have what the whole text has."""
     made = procedure("three-layer")
     steps = number_steps([*made.preparation, *(step for pour in made.pours for step in pour.steps)])
@@ -205,7 +197,7 @@ def test_a_sentence_that_an_earlier_pour_has_is_said_once() -> None:
             assert sentence in own or alike in re.sub(r"(?i)\b(cup|layer|pour) \d", r"\1", said), sentence
 
 
-def test_order_of_the_hands() -> None:
+def test_order_of_the_hands():
     """Tongue first, then the cup; the filament before the peel."""
     casting = procedure("encapsulating")
     for pour in casting.pours:
@@ -215,14 +207,14 @@ def test_order_of_the_hands() -> None:
     assert "peel" in casting.release[1].text
 
 
-def test_resin_and_lid_have_their_own_words() -> None:
+def test_resin_and_lid_have_their_own_words():
     text = procedure_text.to_markdown(procedure("encapsulating", "moulds.printer=sla", "moulds.pour=injected"))
     for words in ("post-cure", "syringe", "from film or steel strip of 0.35 mm", "Remove its tape or bands"):
         assert words in text
     assert "Strike off" not in text
 
 
-def test_bill_counts_pieces() -> None:
+def test_bill_counts_pieces():
     casting = procedure("encapsulating", "moulds.cavities=[2,2]")
     lines = {item.item: item for item in casting.bill}
     assert lines["tongue"].quantity == lines["filament"].quantity == lines["LCM0720A3463F"].quantity == 4
@@ -232,7 +224,7 @@ def test_bill_counts_pieces() -> None:
     assert len(csv) == len(casting.bill) + 1
 
 
-def test_edges_off_the_layer_grid() -> None:
+def test_edges_off_the_layer_grid():
     """A height that is asked for stays where it is, and is listed."""
     moulds = set_of("encapsulating", "moulds.slot_height_mm=0.5", "moulds.plate_mm=4.07")
     edges = {(e.piece, e.edge): e for e in off_grid(moulds)}
@@ -243,7 +235,7 @@ def test_edges_off_the_layer_grid() -> None:
     assert off_grid(set_of("encapsulating", "moulds.layer_mm=0.005")) == []
 
 
-def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said() -> None:
+def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said():
     """Cavity 2.11 and two caps of 1.25 on layers of 0.2: 8.11 and 6.0 above the bed, rims of 3.36 and 4.61."""
     moulds = set_of("encapsulating")
     assert moulds.dimensions.heights == pytest.approx((3.36, 4.61))
@@ -260,7 +252,7 @@ def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said() -> None:
     assert "- Height over all: 4.60 mm (4.61 drawn, in layers of 0.2)." in sheet
 
 
-def test_flats_of_the_printed_pieces_end_whole_layers() -> None:
+def test_flats_of_the_printed_pieces_end_whole_layers():
     """Every level face of base and lids, read off the meshes, is on the grid of a set that asks for no height."""
     moulds = set_of("encapsulating", "moulds.pour=injected", "moulds.cavities=[1,2]")
     for tool in (*moulds.plan.of_kind("base"), *moulds.plan.of_kind("lid")):
@@ -277,21 +269,21 @@ def test_flats_of_the_printed_pieces_end_whole_layers() -> None:
         assert all(any(abs(h - a) < 2e-3 for a in asked) for h in off), (tool.name, off)
 
 
-def test_no_label_reads_as_a_cups_number() -> None:
+def test_no_label_reads_as_a_cups_number():
     assert all("C" not in set_of(name).plan.label for name in templates())
 
 
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
 @pytest.mark.parametrize("name", sorted(templates()))
 @pytest.mark.parametrize("more", [[], ["moulds.pour=injected"]], ids=["", "lids"])
-def test_no_tool_of_a_template_is_off_the_grid(name: str, printer: str, more: list[str]) -> None:
+def test_no_tool_of_a_template_is_off_the_grid(name, printer, more):
     assert off_grid(set_of(name, f"moulds.printer={printer}", *more)) == []
 
 
 @pytest.mark.parametrize("thickness", [1.83, 2.0, 2.65, 3.37])
 @pytest.mark.parametrize("wires", [False, True])
 @pytest.mark.parametrize("layer", [0.1, 0.15, 0.2])
-def test_a_slot_on_the_grid_still_takes_what_leaves(thickness: float, wires: bool, layer: float) -> None:
+def test_a_slot_on_the_grid_still_takes_what_leaves(thickness, wires, layer):
     """Tail or wires lie inside the slot, which is no lower than printer and clearance ask for."""
     leaves = ["wires={diameter_mm=0.4}"] if wires else ["fpcb={thickness_mm=0.11}"]
     moulds = set_of(LEADLESS, f"motor.thickness_mm={thickness}", f"moulds.layer_mm={layer}", *leaves)
@@ -305,7 +297,7 @@ def test_a_slot_on_the_grid_still_takes_what_leaves(thickness: float, wires: boo
     assert [edge for edge in off_grid(moulds) if edge.piece in ("base", "tongue")] == []
 
 
-def as_printed(moulds: MouldSet, windows: Callable[..., tuple[float, float, float]]) -> list[float]:
+def as_printed(moulds, windows):
     """Return the gaps under and over the tongue in every cup, cup, ledge and tongue in whole layers: worked out apart.
 
     Heights over the seat, in layers: the cup's count down from its rim, the ledge's up from the plate.
@@ -329,23 +321,23 @@ def as_printed(moulds: MouldSet, windows: Callable[..., tuple[float, float, floa
 
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_a_tongue_has_its_clearance_in_whole_layers_too(name: str, printer: str) -> None:
+def test_a_tongue_has_its_clearance_in_whole_layers_too(name, printer):
     moulds = set_of(name, f"moulds.printer={printer}")
     least = moulds.spec.moulds.window_clearance_mm
     assert min(as_printed(moulds, window_section), default=least) >= least - 1e-9
 
 
-def test_a_window_drawn_to_the_clearance_alone_meets_the_tongue_in_whole_layers() -> None:
+def test_a_window_drawn_to_the_clearance_alone_meets_the_tongue_in_whole_layers():
     """Planted: window edges that snap to nothing leave no gap in the first cup."""
 
-    def unsnapped(spec: Spec, exit: Exit, _rim: float) -> tuple[float, float, float]:
+    def unsnapped(spec, exit, _rim):
         clearance = spec.moulds.window_clearance_mm
         return exit.width / 2 + clearance, exit.low - clearance, exit.high + clearance
 
     assert min(as_printed(set_of("encapsulating"), unsnapped)) == pytest.approx(0)
 
 
-def test_drawing_of_every_pour_names_its_pieces() -> None:
+def test_drawing_of_every_pour_names_its_pieces():
     moulds = set_of("encapsulating", "moulds.cavities=[2,1]")
     for step in moulds.plan.steps:
         drawing = procedure_text.step_section(moulds, step)
@@ -354,7 +346,7 @@ def test_drawing_of_every_pour_names_its_pieces() -> None:
             assert word in drawing
 
 
-def test_pot_life_is_spent_on_mixing_degassing_and_pouring() -> None:
+def test_pot_life_is_spent_on_mixing_degassing_and_pouring():
     """Eight minutes of work against a pot life of 30 min at 23 degC, 7.5 min at 43 degC."""
     assert "after the pot life" not in procedure("embedded").pours[0].verdict
     assert "ends 0.5 min after the pot life" in procedure("embedded", "casting.room_c=43").pours[0].verdict
@@ -364,14 +356,14 @@ def test_pot_life_is_spent_on_mixing_degassing_and_pouring() -> None:
 
 
 @pytest.mark.parametrize("more", [[], ["moulds.cavities=[2,3]"], ["moulds.pour=injected"]], ids=["one", "gang", "lid"])
-def test_a_unit_weighs_what_one_trimmed_unit_weighs(more: list[str]) -> None:
+def test_a_unit_weighs_what_one_trimmed_unit_weighs(more):
     """Ecoflex 00-10 1.04, Dragon Skin 30 1.08 g/cm3: neither the gang's grams nor what stands in sprue and vents."""
     weigh = procedure("encapsulating", *more).measure[-1]
     assert "0.221 + 0.388 = 0.609 g" in weigh
     assert ("strike" in weigh) == ("moulds.pour=injected" not in more)
 
 
-def test_a_motor_that_nothing_holds_is_fixed() -> None:
+def test_a_motor_that_nothing_holds_is_fixed():
     """An open ring without a pad: silicone round the motor, or motor.fill."""
     ring = "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]"
     assert "fill the ring of 1 mm" in procedure(LEADLESS, "design=embedded", ring).assembly[-2].text
@@ -379,7 +371,7 @@ def test_a_motor_that_nothing_holds_is_fixed() -> None:
 
 @pytest.mark.parametrize("name", sorted(templates()))
 @pytest.mark.parametrize("more", [[], ["moulds.printer=sla"], ["casting.vacuum=false"]], ids=["", "sla", "no vacuum"])
-def test_a_procedure_keeps_every_rule(name: str, more: list[str]) -> None:
+def test_a_procedure_keeps_every_rule(name, more):
     assert broken_rules(procedure(name, *more)) == []
 
 
@@ -388,14 +380,14 @@ def test_a_procedure_keeps_every_rule(name: str, more: list[str]) -> None:
     [(1, Face("cup1", "bore")), (1, Face("base", "core")), (2, Face("cup1", "bore")), (2, Face("base", "seat"))],
     ids=lambda value: str(value),
 )
-def test_agent_on_a_bond_face_breaks_a_rule(pour: int, face: Face) -> None:
+def test_agent_on_a_bond_face_breaks_a_rule(pour, face):
     """Planted: Layer 2 and the motor don't bond where agent was."""
     casting = procedure("encapsulating")
     pours = [replace(p, agent=(face,)) if p.index == pour else p for p in casting.pours]
     assert any("whose cast bonds to" in fault for fault in broken_rules(replace(casting, pours=tuple(pours))))
 
 
-def test_agent_before_the_last_pour_breaks_a_rule(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_agent_before_the_last_pour_breaks_a_rule(monkeypatch):
     """Planted where the procedure is made: data and words are of one source."""
     for module in (casting_procedure, pouring):
         monkeypatch.setattr(module, "agent_faces", lambda _moulds, step: (Face(step.cup, "bore"),))
@@ -405,24 +397,24 @@ def test_agent_before_the_last_pour_breaks_a_rule(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_words_allow_agent_on_the_last_cups_bore_alone(name: str) -> None:
+def test_words_allow_agent_on_the_last_cups_bore_alone(name):
     casting = procedure(name)
     text = procedure_text.to_markdown(casting)
     assert re.findall(r"only on the (bore of cup \d+)", text) == [f"bore of cup {len(casting.pours)}"]
     assert text.count("No release agent: what is cast here") == len(casting.pours) - 1
 
 
-def test_a_custom_design_of_two_layers_gets_no_agent() -> None:
+def test_a_custom_design_of_two_layers_gets_no_agent():
     """Its last cup's bore may meet the first layer's edge, to which the second bonds."""
     moulds = set_of("custom/film-closed")
     assert [pouring.agent_faces(moulds, step) for step in moulds.plan.steps] == [(), ()]
 
 
-def words(*source: str) -> str:
+def words(*source):
     return procedure_text.to_markdown(procedure(*source))
 
 
-def test_each_layer_but_the_first_lies_between_two_cup_positions() -> None:
+def test_each_layer_but_the_first_lies_between_two_cup_positions():
     """Where no ribs centre the cups; where they do, none is pushed aside."""
     pushed = procedure("three-layer", "moulds.rib_interference_mm=0")
     said = [re.findall(r"Layer (\d) lies between", " ".join(texts(pour.steps))) for pour in pushed.pours]
@@ -434,7 +426,7 @@ def test_each_layer_but_the_first_lies_between_two_cup_positions() -> None:
     assert "towards the cut corner" in words("encapsulating", "moulds.rib_interference_mm=0")
 
 
-def test_leaves_of_resin_bend_and_the_seat_bears() -> None:
+def test_leaves_of_resin_bend_and_the_seat_bears():
     said = words("encapsulating", "moulds.printer=sla")
     assert "leaves 0.5 mm thick, which bend and centre it" in said
     assert "crushed" not in said
@@ -442,7 +434,7 @@ def test_leaves_of_resin_bend_and_the_seat_bears() -> None:
     assert "towards the cut corner" not in said
 
 
-def test_walls_vary_by_what_the_ribs_leave() -> None:
+def test_walls_vary_by_what_the_ribs_leave():
     """Eight ribs, each 30 % off: 0.3 x 0.1 mm along x and y; 0.3 x 0.25 where the gap is printed 0.15 narrower."""
     casting = procedure("encapsulating")
     assert casting.eccentricity.as_drawn_mm == pytest.approx(0.03 * math.sqrt(2))
@@ -460,7 +452,7 @@ def test_walls_vary_by_what_the_ribs_leave() -> None:
     }
 
 
-def test_a_lid_set_speaks_of_lids_alone() -> None:
+def test_a_lid_set_speaks_of_lids_alone():
     text = words("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
     assert "cups and lids upside down" in text
     assert "on cups and lids" in text
@@ -469,19 +461,19 @@ def test_a_lid_set_speaks_of_lids_alone() -> None:
         assert other not in text
 
 
-def test_an_open_set_speaks_of_cups_and_blade() -> None:
+def test_an_open_set_speaks_of_cups_and_blade():
     text = words("encapsulating")
     assert "cups and blade upside down" in text
     assert "touch the silicone in the groove" in text
     assert "lid" not in text.replace("slide", "").replace("solid", "")
 
 
-def test_resin_has_no_strings() -> None:
+def test_resin_has_no_strings():
     assert "strings" not in words("encapsulating", "moulds.printer=sla")
     assert "strings" in words("encapsulating")
 
 
-def test_a_cut_tongue_is_described() -> None:
+def test_a_cut_tongue_is_described():
     """The film's thickness, width and the radius of the core's riser: it has no file."""
     moulds = set_of("encapsulating", "moulds.printer=sla")
     step = next(
@@ -494,7 +486,7 @@ def test_a_cut_tongue_is_described() -> None:
     assert "Cut" not in " ".join(texts(procedure("encapsulating").preparation))
 
 
-def test_a_cup_that_nothing_holds_breaks_a_rule() -> None:
+def test_a_cup_that_nothing_holds_breaks_a_rule():
     casting = procedure("encapsulating")
     first, *more = casting.pours
     held = [step for step in first.steps if step.title == "Hold cup 1 down"]
@@ -507,7 +499,7 @@ def test_a_cup_that_nothing_holds_breaks_a_rule() -> None:
         assert faults[0] == "pour 1: nothing holds the cup down while it is struck off"
 
 
-def test_a_cup_lifted_over_a_tongue_breaks_a_rule() -> None:
+def test_a_cup_lifted_over_a_tongue_breaks_a_rule():
     casting = procedure("encapsulating")
     first, *more = casting.pours
     steps = tuple(step for step in first.steps if step.title != "Tongue out FIRST")
@@ -529,7 +521,7 @@ ODD = ("diameter_mm=14.3217", "layers.0.wall_mm=1.23456", "moulds.plinth_clearan
     ],
     ids=lambda source: " ".join(source),
 )
-def test_figures_have_three_digits_at_most(source: list[str]) -> None:
+def test_figures_have_three_digits_at_most(source):
     """Neither 1.4e+04 cps nor 0.07323 %; what a name or a source says is not this project's figure."""
     casting = procedure(*source)
     figures = [*casting.walls, *(figure for pour in casting.pours for figure in pour.figures)]
@@ -548,12 +540,12 @@ def test_figures_have_three_digits_at_most(source: list[str]) -> None:
     ("value", "shown"),
     [(14000.0, "14000"), (0.07323, "0.0732"), (7.692, "7.69"), (1.0, "1"), (9.996, "10"), (-0.0, "0"), (36, "36")],
 )
-def test_number_has_no_power_of_ten(value: float, shown: str) -> None:
+def test_number_has_no_power_of_ten(value, shown):
     assert number(value, 3) == shown
     assert float(number(value, 3, zeros=True)) == float(shown)
 
 
-def test_windows_that_resin_closes_are_cleared() -> None:
+def test_windows_that_resin_closes_are_cleared():
     casting = procedure("three-layer", "moulds.printer=sla")
     assert casting.tunnels == ("cup1", "cup2", "cup3")
     said = [i for i, step in enumerate(casting.preparation) if "windows of cup 1, cup 2 and cup 3" in step.text]
@@ -570,7 +562,7 @@ def test_windows_that_resin_closes_are_cleared() -> None:
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "pass-through", "three-layer"])
-def test_tools_in_resin_have_no_warning(name: str, tmp_path: Path) -> None:
+def test_tools_in_resin_have_no_warning(name, tmp_path):
     done = build(load(name, ["moulds.printer=sla", "output.formats=['stl']"]), tmp_path, only=("moulds",))
     assert done.manifest["check"] == {"errors": 0, "warnings": 0, "findings": []}
 

@@ -1,9 +1,6 @@
 """Cells of a gang in like surroundings: found from the drawing, judged once, with the findings of the whole plate."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -15,7 +12,7 @@ from unitcad.checks import check_moulds, draw, groove_walls
 from unitcad.kernels.mesh import realise, shells
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.surroundings import column_round
-from unitcad.shape import Shape, box, cut, union
+from unitcad.shape import box, cut, union
 
 BED = ("moulds.bed_x_mm=1000", "moulds.bed_y_mm=1000")
 GANGS = [
@@ -33,14 +30,14 @@ BELOW = box(-1, 1, -1, 1, -30, -29)
 """A box under the middle of a plate."""
 
 
-def each_cell_alone(moulds: MouldSet) -> MouldSet:
+def each_cell_alone(moulds):
     """Return the same set, every cell of which counts as one of its own."""
     alone = MouldSet(moulds.spec, moulds.altered)
     alone.__dict__["cells"] = (tuple(range(len(moulds.plan.layout.cells))),) * len(moulds.plan.steps)
     return alone
 
 
-def whole_plate_cavity(moulds: MouldSet, step: int) -> list[Manifold]:
+def whole_plate_cavity(moulds, step):
     """Return what silicone can reach in a pour of the whole plate: block less all tools, seals and cured layers."""
     pour = moulds.plan.steps[step]
     tools = [moulds.solids[name] for name in pour.tools]
@@ -51,7 +48,7 @@ def whole_plate_cavity(moulds: MouldSet, step: int) -> list[Manifold]:
 
 
 @pytest.mark.parametrize("gang", GANGS, ids=[" ".join(gang) for gang in GANGS])
-def test_a_cell_s_cavity_is_that_of_the_whole_plate(gang: tuple[str, ...]) -> None:
+def test_a_cell_s_cavity_is_that_of_the_whole_plate(gang):
     moulds = set_of(*gang)
     for step in range(len(moulds.plan.steps)):
         there = whole_plate_cavity(moulds, step)
@@ -69,7 +66,7 @@ def test_a_cell_s_cavity_is_that_of_the_whole_plate(gang: tuple[str, ...]) -> No
         pytest.param((LEADLESS, "moulds.cavities=[6,6]"), marks=pytest.mark.long),
     ],
 )
-def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...]) -> None:
+def test_like_cells_have_the_findings_that_each_has_alone(gang):
     moulds = set_of(*gang)
     assert all(len(set(cells)) < len(cells) for cells in moulds.cells)
     assert [shown(f) for f in check_moulds(moulds)] == [shown(f) for f in check_moulds(each_cell_alone(moulds))]
@@ -84,16 +81,14 @@ def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...])
         if (cells := columns * rows) in (4, 6, 9, 16, 25, 36)
     ],
 )
-def test_a_gang_s_groove_walls_are_those_of_the_whole_plate(
-    gang: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_gang_s_groove_walls_are_those_of_the_whole_plate(gang, monkeypatch):
     moulds = set_of(*gang)
     in_parts = [shown(finding) for finding in groove_walls.findings(moulds)]
     monkeypatch.setattr(groove_walls, "_tiles", lambda *_: [])
     assert in_parts == [shown(finding) for finding in groove_walls.findings(MouldSet(moulds.spec))]
 
 
-def test_a_groove_that_joins_its_cells_is_looked_at_cell_by_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_groove_that_joins_its_cells_is_looked_at_cell_by_cell(monkeypatch):
     """Ends of the joints' sides lie nearer to the cells than their middles do."""
     made = []
     tiles = groove_walls._tiles
@@ -107,7 +102,7 @@ def test_a_groove_that_joins_its_cells_is_looked_at_cell_by_cell(monkeypatch: py
     assert made == [20] * len(made)
 
 
-def test_shells_are_what_manifold_tells_apart() -> None:
+def test_shells_are_what_manifold_tells_apart():
     hollow = Manifold.sphere(3, 16) - Manifold.cube((1, 1, 1), True)
     parts = [Manifold.cube((1, 2, 1)).translate((3 * i, 0, 0)) for i in range(40)] + [hollow.translate((0, 50, 0))]
     solid = Manifold.compose(parts)
@@ -116,7 +111,7 @@ def test_shells_are_what_manifold_tells_apart() -> None:
     assert sorted(map(sizes, found)) == sorted(map(sizes, known))
 
 
-def sizes(solid: Manifold) -> tuple[float, ...]:
+def sizes(solid):
     return tuple(round(value, 9) for value in (*solid.bounding_box(), solid.volume()))
 
 
@@ -126,7 +121,7 @@ def shown(finding):
     return finding.code, where, finding.ok, round(finding.value, 6), round(finding.limit, 6)
 
 
-FAULTS: list[tuple[str, str, Callable[[Shape], Shape]]] = [
+FAULTS = [
     ("C100", "base", lambda shape: cut(shape, [box(15, 16, 0, 1, 1.5, 9)])),
     ("C100", "cup2", lambda shape: union((shape, box(-19, -17, 6.5, 7.2, 1, 2)))),
     ("C300", "cup2", lambda shape: union((shape, box(16, 18, 24.9, 25.1, 1, 2)))),
@@ -135,7 +130,7 @@ FAULTS: list[tuple[str, str, Callable[[Shape], Shape]]] = [
 
 
 @pytest.mark.parametrize(("code", "tool", "change"), FAULTS)
-def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callable[[Shape], Shape]) -> None:
+def test_a_fault_in_one_cell_is_found_there(code, tool, change):
     faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), tool, change)
     found = {(f.code, f.where) for f in check_moulds(faulty) if not f.ok}
     alone = {(f.code, f.where) for f in check_moulds(each_cell_alone(faulty)) if not f.ok}
@@ -145,7 +140,7 @@ def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callab
     assert len(cells) <= 2  # pours of that one cell
 
 
-def test_of_filaments_that_leave_together_the_one_that_is_caught_is_named() -> None:
+def test_of_filaments_that_leave_together_the_one_that_is_caught_is_named():
     """A piece of the base below the middle filament stops it, and no other."""
     faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
     found = [f for f in draw.findings(faulty) if not f.ok]
@@ -155,13 +150,13 @@ def test_of_filaments_that_leave_together_the_one_that_is_caught_is_named() -> N
     assert found[0].value == pytest.approx(math.pi / 2 * radius**2 + 2 * radius, rel=1e-3)
 
 
-def test_a_hundred_cells_have_one_surrounding() -> None:
+def test_a_hundred_cells_have_one_surrounding():
     """The filaments' ways, which differ from row to row, lie below them; numbers lie beside them."""
     moulds = set_of(LEADLESS, "moulds.cavities=[10,10]", *BED)
     assert [len(set(cells)) for cells in moulds.cells] == [1, 1]
 
 
-def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:
+def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own():
     moulds = set_of(LEADLESS, "moulds.cavities=[3,3]")
     cell = moulds.plan.layout.cells[4]
     wedge = Manifold.cube((0.5, 0.02, 0.5)).translate((cell.x + 4.2, cell.y, 1.0))
@@ -171,7 +166,7 @@ def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:
     assert [cells.count(cells[4]) for cells in moulds.cells] == [9, 9]
 
 
-def test_a_column_goes_round_what_it_is_drawn_for() -> None:
+def test_a_column_goes_round_what_it_is_drawn_for():
     column = column_round([Manifold.cube((2, 2, 1)).translate((4, 6, 0))], 0.5)
     assert (column.x, column.y) == (5, 7)
     assert column.radius == pytest.approx(2**0.5 + 0.5)

@@ -1,10 +1,6 @@
 """Custom designs: overlaps without moulds, moulds by complement of the cast layers, and what is refused."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
-from typing import Any
 
 import pytest
 from faulty_sets import broken, mesh_findings, of_spec, set_of
@@ -15,13 +11,12 @@ from unitcad.checks import check_moulds, mould_checks, opening
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import printing
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.complement import complement
 from unitcad.moulds.cup import cup_blank
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import cast_layers
-from unitcad.pipeline.write import Built, build
-from unitcad.shape import Revolve, Shape, cut, polygon, union
+from unitcad.pipeline.write import build
+from unitcad.shape import Revolve, cut, polygon, union
 from unitcad.validation import custom_templates, load, templates
 
 SPEC = """
@@ -40,19 +35,19 @@ from unitcad.shape import Extrude, Profile, Revolve, box, cut, cylinder, moved, 
 """
 
 
-def written(folder: Path, code: str, layers: int = 1, circuit: str = "") -> Path:
+def written(folder, code, layers=1, circuit=""):
     """Write a custom design and its spec."""
     (folder / "drawn.py").write_text(HEAD + code)
     (folder / "spec.toml").write_text(SPEC.format(layers=LAYER * layers, circuit=circuit))
     return folder / "spec.toml"
 
 
-def built(folder: Path, code: str, *only: str, **more: Any) -> Built:
+def built(folder, code, *only, **more):
     """Build a custom design."""
     return build(load(written(folder, code, **more)), folder / "out", only=only or ("unit",))
 
 
-def test_overlaps_inside_the_unit_are_errors_without_moulds_too(tmp_path: Path) -> None:
+def test_overlaps_inside_the_unit_are_errors_without_moulds_too(tmp_path):
     """The circuit's tail, 3 x 0.11 mm, runs through 1.25 mm of a ring as high as motor and circuit."""
     code = "def unit(spec):\n    return ring(5.75, 7.0, 0, 2.11)\n"
     done = built(tmp_path, code, circuit="[fpcb]\nthickness_mm = 0.11\n")
@@ -76,17 +71,17 @@ def unit(spec):
 """
 
 
-def lugs(half: float = 4.5, low: float = 3.0, high: float = 4.5) -> str:
+def lugs(half=4.5, low=3.0, high=4.5):
     """A rounded rectangle with a lug and a strap slot on two sides."""
     return LUGS.replace("HALF", str(half)).replace("LOW", str(low)).replace("HIGH", str(high))
 
 
-def moulds_of(folder: Path, code: str, *overrides: str, layers: int = 1) -> MouldSet:
+def moulds_of(folder, code, *overrides, layers=1):
     """Return the mould set of a custom design."""
     return of_spec(load(written(folder, code, layers=layers), overrides))
 
 
-def test_cup_base_layers_and_seals_fill_the_block(tmp_path: Path) -> None:
+def test_cup_base_layers_and_seals_fill_the_block(tmp_path):
     moulds = moulds_of(tmp_path, lugs(), layers=2)
     spec, lay, drawn = moulds.spec, moulds.plan.layout, complement(moulds.spec, cast_layers(moulds.spec))
     depths = {1: 0.0, 2: spec.moulds.groove_depth_mm}  # the supports' holes leave cup 1 no room for a groove
@@ -94,7 +89,7 @@ def test_cup_base_layers_and_seals_fill_the_block(tmp_path: Path) -> None:
     ring_area = math.pi * ((inner + spec.moulds.groove_width_mm) ** 2 - inner**2)
     for step in moulds.plan.steps:
 
-        def volume(shape: Shape, top: float = step.rim) -> float:
+        def volume(shape, top=step.rim):
             solid = realise(shape, moulds.segments).trim_by_plane((0, 0, 1), 0.0)
             return solid.trim_by_plane((0, 0, -1), -top).volume()
 
@@ -108,17 +103,17 @@ def test_cup_base_layers_and_seals_fill_the_block(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("overrides", [[], ["moulds.cavities=[2,1]"], ["moulds.printer=fdm-0.25"]])
-def test_strap_lugs_keep_every_check(tmp_path: Path, overrides: list[str]) -> None:
+def test_strap_lugs_keep_every_check(tmp_path, overrides):
     found = check_moulds(moulds_of(tmp_path, lugs(), *overrides, layers=2))
     assert [finding for finding in found if not finding.ok] == []
     assert {finding.code for finding in found} == set(mould_checks())
 
 
-def test_lugs_at_the_skin_hold_air(tmp_path: Path) -> None:
+def test_lugs_at_the_skin_hold_air(tmp_path):
     assert broken(moulds_of(tmp_path, lugs(low=0.0, high=1.5), layers=2)) == {"C400"}
 
 
-def test_a_support_with_a_knife_edge_has_no_clearance(tmp_path: Path) -> None:
+def test_a_support_with_a_knife_edge_has_no_clearance(tmp_path):
     """Lugs as wide as the body meet its round corner in an edge without thickness."""
     assert broken(moulds_of(tmp_path, lugs(half=7.25), layers=2)) == {"C210"}
 
@@ -128,7 +123,7 @@ DOME = (
 )
 
 
-def test_a_dome_has_no_opening_to_pour_into(tmp_path: Path) -> None:
+def test_a_dome_has_no_opening_to_pour_into(tmp_path):
     with pytest.raises(
         Refusal, match="pour 1 can't be cast: the layer's top, at x = 0, y = 0, z = 4 mm, leaves an"
     ) as bad:
@@ -149,7 +144,7 @@ def test_a_dome_has_no_opening_to_pour_into(tmp_path: Path) -> None:
         assert area.value == pytest.approx(math.pi * flat**2, rel=2e-3)
 
 
-def test_a_layer_below_its_rim_has_no_opening(tmp_path: Path) -> None:
+def test_a_layer_below_its_rim_has_no_opening(tmp_path):
     code = "def unit(spec):\n    return {'layer1': ring(4, 5, 0, 3), 'layer2': ring(5, 7, 0, 2)}\n"
     with pytest.raises(
         Refusal, match=r"pour 2 can.t be cast: the layer.s top, at .*, z = 2 mm, leaves an opening of 0 mm2"
@@ -157,7 +152,7 @@ def test_a_layer_below_its_rim_has_no_opening(tmp_path: Path) -> None:
         moulds_of(tmp_path, code, layers=2)
 
 
-def test_c410_measures_the_opening() -> None:
+def test_c410_measures_the_opening():
     """A cavity that ends in a point, as a design's own tooling might leave it."""
     moulds = set_of("single-embedded")
     (cavity,) = moulds.cavities
@@ -170,7 +165,7 @@ def test_c410_measures_the_opening() -> None:
     assert "no room to pour" in found[0].advice
 
 
-def _with_cavity(moulds: MouldSet, cavity: Cavity) -> MouldSet:
+def _with_cavity(moulds, cavity):
     moulds.__dict__["cavities"] = [cavity]
     return moulds
 
@@ -191,16 +186,16 @@ def _with_cavity(moulds: MouldSet, cavity: Cavity) -> MouldSet:
         ("{'frame': cylinder(7, 0, 4)}", 1, r"needs? each of the spec's 1 \[\[layers\]\] drawn"),
     ],
 )
-def test_what_has_no_mould_is_refused_with_pour_and_place(tmp_path: Path, drawn: str, layers: int, why: str) -> None:
+def test_what_has_no_mould_is_refused_with_pour_and_place(tmp_path, drawn, layers, why):
     with pytest.raises(Refusal, match=why):
         moulds_of(tmp_path, f"def unit(spec):\n    return {drawn}\n", layers=layers)
 
 
-def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path: Path) -> None:
+def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path):
     """A fingertip gel: a ball's cap with a flange, hollow from above. The core's volume is the hollow's."""
     arc = [(math.sin(math.radians(a)), 1 - math.cos(math.radians(a))) for a in range(0, 61, 5)]
 
-    def cap(radius: float, tip: float, *above: tuple[float, float]) -> Shape:
+    def cap(radius, tip, *above):
         return Revolve(polygon(*((radius * x, tip + radius * z) for x, z in arc), *above))
 
     hollow = cap(9.5, 2.5, (9.5 * arc[-1][0], 10), (0, 10))
@@ -225,7 +220,7 @@ def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("drawn", ["ring(4, 7, 0, 2)", "cut(cylinder(7, 0, 4), [cylinder(5, 1, 5)])"])
-def test_a_lid_keeps_every_check(tmp_path: Path, drawn: str) -> None:
+def test_a_lid_keeps_every_check(tmp_path, drawn):
     """Also a gang's, whose lid carries two cores."""
     for cavities in ("[1,1]", "[2,1]"):
         moulds = moulds_of(
@@ -239,7 +234,7 @@ def test_a_lid_keeps_every_check(tmp_path: Path, drawn: str) -> None:
         assert moulds.hung(moulds.plan.steps[0]) == (3.0 if "cut" in drawn else 0.0)
 
 
-def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path: Path) -> None:
+def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path):
     """The same tools, solid by solid, as those that are drawn from lengths; only the engraved label differs."""
     known = of_spec(load("single-embedded"))
     (radius,), inner, (height,) = known.dimensions.radii, known.dimensions.cavity_radius, known.dimensions.heights
@@ -253,7 +248,7 @@ def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path: Path) -> None:
     assert broken(moulds) == set()
 
 
-def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
+def test_a_build_writes_moulds_and_casting(tmp_path):
     done = built(tmp_path, lugs(), "unit", "moulds", "casting", "estimate", layers=2)
     assert done.ok
     assert done.manifest["outputs"] == ["unit", "moulds", "casting"]
@@ -266,7 +261,7 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("earlier", [False, True])
-def test_only_an_estimate_is_refused_beside_a_result_too(earlier: bool, tmp_path: Path) -> None:
+def test_only_an_estimate_is_refused_beside_a_result_too(earlier, tmp_path):
     if earlier:
         built(tmp_path, lugs(), layers=2)
     there = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()}
@@ -292,12 +287,12 @@ unit = Design(
 """
 
 
-def assembly_of(moulds: MouldSet) -> tuple[str, ...]:
+def assembly_of(moulds):
     casting = procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], 0.0)
     return tuple(step.text for step in casting.assembly if not step.title.startswith("Let the"))
 
 
-def test_motor_and_circuit_of_a_function_are_put_in() -> None:
+def test_motor_and_circuit_of_a_function_are_put_in():
     solder, push, rest = assembly_of(of_spec(load(CUSTOM / "strap-lugs.toml")))
     assert solder.startswith("Solder the motor to the circuit's pad")
     assert push == "Push the motor, the pad ahead, into the cavity from the skin, and lay the tail in the notch."
@@ -312,14 +307,14 @@ def test_motor_and_circuit_of_a_function_are_put_in() -> None:
         ("assembly=lambda spec, dims: ['Glue it in.']", "Glue it in."),
     ],
 )
-def test_the_motor_goes_in_where_the_design_opens_or_as_it_says(more: str, first: str, tmp_path: Path) -> None:
+def test_the_motor_goes_in_where_the_design_opens_or_as_it_says(more, first, tmp_path):
     steps = assembly_of(of_spec(load(written(tmp_path, OWN.replace("MORE", more)))))
     assert steps[0] == first
     assert len(steps) == (1 if "assembly" in more else 2)
 
 
 @pytest.mark.parametrize(("name", "change"), [("strap-lugs", {}), ("film-closed", {}), ("dome", FLAT_TOP)])
-def test_the_worked_examples_are_built_whole(name: str, change: dict[str, object], tmp_path: Path) -> None:
+def test_the_worked_examples_are_built_whole(name, change, tmp_path):
     spec = load(CUSTOM / f"{name}.toml", change | {"output.formats": ["stl", "svg"]})
     done = build(spec, tmp_path)
     assert done.ok
@@ -329,14 +324,14 @@ def test_the_worked_examples_are_built_whole(name: str, change: dict[str, object
     assert {"casting.md", "bom.csv", "moulds/base.stl", "step1-section.svg", *pours} <= set(done.manifest["files"])
 
 
-def test_the_dome_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
+def test_the_dome_is_refused_and_nothing_is_written(tmp_path):
     with pytest.raises(Refusal, match=r"pour 1 can't be cast: the layer's top, at x = 0, y = 0, z = 4 mm"):
         build(load(CUSTOM / "dome.toml"), tmp_path / "out")
     assert not list(tmp_path.rglob("*.*"))
     assert build(load(CUSTOM / "dome.toml"), tmp_path / "out", only=("unit",)).ok
 
 
-def test_every_worked_example_has_its_test() -> None:
+def test_every_worked_example_has_its_test():
     names = {file.stem for file in CUSTOM.glob("*.toml")}
     assert names == {"strap-lugs", "film-closed", "dome"}
     assert not names & set(templates())

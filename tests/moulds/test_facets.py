@@ -1,7 +1,5 @@
 """Films that facets leave are told from pieces by their thickness: bodies from STEP, and films alone."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -13,8 +11,7 @@ from manifold3d import Manifold
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import thick_pieces
-from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape import Shape, cut, cylinder, ring
+from unitcad.shape import cut, cylinder, ring
 from unitcad.shape.profile import FACETS
 from unitcad.shape.tree import Body
 from unitcad.validation import load
@@ -34,14 +31,14 @@ cap_mm = 2.0
 """
 
 
-def moulds_of(folder: Path, design: Path, motor: float = 2.7) -> MouldSet:
+def moulds_of(folder, design, motor=2.7):
     """Return the mould set of a file of bodies."""
     pytest.importorskip("OCP")
     (folder / "spec.toml").write_text(SPEC.format(design=design, motor=motor))
     return of_spec(load(folder / "spec.toml"))
 
 
-def step_of(folder: Path, shape: Shape) -> Path:
+def step_of(folder, shape):
     """Write a layer as STEP."""
     pytest.importorskip("OCP")
     from unitcad.export import step
@@ -50,12 +47,12 @@ def step_of(folder: Path, shape: Shape) -> Path:
     return folder / "body.step"
 
 
-def turned(solid: Manifold, seed: int) -> Manifold:
+def turned(solid, seed):
     return solid.rotate(tuple(np.random.default_rng(seed).uniform(0, 360, 3)))
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_film_is_told_by_its_thickness(seed: int) -> None:
+def test_a_film_is_told_by_its_thickness(seed):
     for share, kept in ((0.8, 0), (1.2, 1)):
         film = turned(Manifold.cube((5, 3, share * FACETS)), seed)
         assert len(thick_pieces(film)) == kept
@@ -68,11 +65,11 @@ def test_a_film_is_told_by_its_thickness(seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["round4", "round6", "cyl"])
-def test_bodies_with_round_edges_get_moulds_that_keep_every_check(name: str, tmp_path: Path) -> None:
+def test_bodies_with_round_edges_get_moulds_that_keep_every_check(name, tmp_path):
     assert broken(moulds_of(tmp_path, BODIES / f"{name}.step")) == set()
 
 
-def test_a_body_without_a_pocket_gets_moulds_and_a_finding(tmp_path: Path) -> None:
+def test_a_body_without_a_pocket_gets_moulds_and_a_finding(tmp_path):
     moulds = moulds_of(tmp_path, BODIES / "plug30.step")
     (finding,) = [finding for finding in check_moulds(moulds) if not finding.ok]
     assert (finding.code, finding.where) == ("C200", "unit: layer1 and motor")
@@ -88,9 +85,7 @@ def test_a_body_without_a_pocket_gets_moulds_and_a_finding(tmp_path: Path) -> No
         (3.5, 2.68, math.pi * 3.5**2 * 0.02),
     ],
 )
-def test_an_exact_pocket_holds_its_motor_and_one_too_small_by_0_02_does_not(
-    radius: float, depth: float, shared: float, tmp_path: Path
-) -> None:
+def test_an_exact_pocket_holds_its_motor_and_one_too_small_by_0_02_does_not(radius, depth, shared, tmp_path):
     body = step_of(tmp_path, cut(cylinder(8, 0, 6), [cylinder(radius, -1, depth)]))
     found = [finding for finding in check_moulds(moulds_of(tmp_path, body)) if not finding.ok]
     if not shared:
@@ -102,7 +97,7 @@ def test_an_exact_pocket_holds_its_motor_and_one_too_small_by_0_02_does_not(
     assert finding.value == pytest.approx(shared, abs=facets)
 
 
-def test_a_hollow_of_five_films_is_refused(tmp_path: Path) -> None:
+def test_a_hollow_of_five_films_is_refused(tmp_path):
     body = step_of(tmp_path, cut(cylinder(8, 0, 6), [cylinder(3.6, -1, 2.7), ring(4.5, 9, 4, 4 + 5 * FACETS)]))
     with pytest.raises(Refusal, match=r"a hollow of .* is closed in by silicone below and above"):
         moulds_of(tmp_path, body)

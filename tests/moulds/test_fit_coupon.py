@@ -1,7 +1,5 @@
 """The coupon: every station has the clearance that its line of TOML says, measured on the meshes."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib
@@ -22,12 +20,12 @@ GRID = 2 / 1024
 SEGMENTS = 64
 
 
-def pieces(name: str) -> dict[str, Manifold]:
+def pieces(name):
     return {body.name: realise(body.shape, SEGMENTS) for body in coupon.Coupon(printers()[name]).bodies()}
 
 
 @pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
-def test_stations_have_the_clearances_they_say(name: str) -> None:
+def test_stations_have_the_clearances_they_say(name):
     printer = printers()[name]
     plate = pieces(name)["coupon-plate"]
     assert len(plate.decompose()) == 1
@@ -70,7 +68,7 @@ def test_stations_have_the_clearances_they_say(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
-def test_its_toml_is_taken_by_a_spec(name: str) -> None:
+def test_its_toml_is_taken_by_a_spec(name):
     printer = printers()[name]
     block = coupon.Coupon(printer).markdown().split("```toml\n")[1].split("```")[0]
     spec = from_data({**read("encapsulating"), **tomllib.loads(block)})
@@ -81,7 +79,7 @@ def test_its_toml_is_taken_by_a_spec(name: str) -> None:
         assert getattr(from_data(data).moulds, fit.key) == fit.values_mm[3]
 
 
-def test_command_writes_a_folder(tmp_path: Path) -> None:
+def test_command_writes_a_folder(tmp_path):
     from unitcad.cli import app
 
     result = CliRunner().invoke(app, ["coupon", "fdm-0.4", "-o", str(tmp_path), "--json"])
@@ -94,14 +92,14 @@ def test_command_writes_a_folder(tmp_path: Path) -> None:
     assert first == {file.name: file.read_bytes() for file in Path(output["folder"]).iterdir()}
 
 
-def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
+def test_resin_coupon_prints_no_tongue(tmp_path):
     from unitcad.casting.coupon import write
 
     assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
 
 
 @pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
-def test_windows_end_whole_layers_and_keep_the_clearance(name: str) -> None:
+def test_windows_end_whole_layers_and_keep_the_clearance(name):
     printer = printers()[name]
     layer, thick = float(printer.layer_mm), float(printer.slot_height_mm)
     around = next(fit.values_mm for fit in coupon.Coupon(printer).fits.values() if fit.feature == "window")
@@ -113,7 +111,7 @@ def test_windows_end_whole_layers_and_keep_the_clearance(name: str) -> None:
     assert "differ only in width" in coupon.Coupon(printer).markdown()
 
 
-def test_resin_coupon_says_how_to_cut_the_tongue() -> None:
+def test_resin_coupon_says_how_to_cut_the_tongue():
     text = coupon.Coupon(printers()["sla"]).markdown()
     assert "cut a strip 3.4 mm wide" in text
     assert "0.35 mm thick" in text

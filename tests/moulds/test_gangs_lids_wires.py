@@ -1,7 +1,5 @@
 """Gangs, lids and wires: what fits, what is refused and why, and that what is accepted passes the mould checks."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -17,13 +15,12 @@ from unitcad.errors import Refusal
 from unitcad.moulds import lid
 from unitcad.moulds.layout import layout
 from unitcad.moulds.plan import plan
-from unitcad.spec import Spec
 from unitcad.validation import from_data, load, read
 
 WIRES = {"diameter_mm": 0.3, "count": 2}
 
 
-def wired(design: str) -> dict:
+def wired(design):
     data = {key: value for key, value in read(design).items() if key != "fpcb"}
     return {**data, "wires": WIRES}
 
@@ -31,7 +28,7 @@ def wired(design: str) -> dict:
 @pytest.mark.parametrize(
     ("name", "size", "cells"), [("embedded", 73, 9), ("encapsulating", 73, 6), ("pass-through", 73, 3)]
 )
-def test_fill_takes_what_the_bed_takes_and_no_more(name: str, size: int, cells: int) -> None:
+def test_fill_takes_what_the_bed_takes_and_no_more(name, size, cells):
     bed = [f"moulds.bed_{axis}_mm={size}" for axis in "xy"]
     lay = set_of(name, 'moulds.cavities="fill"', *bed).plan.layout
     assert len(lay.cells) == cells
@@ -43,7 +40,7 @@ def test_fill_takes_what_the_bed_takes_and_no_more(name: str, size: int, cells: 
     assert "exceeds the bed by" in str(refused.value)
 
 
-def accepted(spec: Spec, columns: int, rows: int) -> bool:
+def accepted(spec, columns, rows):
     one = structs.replace(spec, moulds=structs.replace(spec.moulds, cavities=(columns, rows)))
     try:
         return len(layout(one, dimensions(one)).cells) == columns * rows
@@ -65,7 +62,7 @@ def accepted(spec: Spec, columns: int, rows: int) -> bool:
         ("pass-through", []),
     ],
 )
-def test_fill_has_the_most_cells_of_all_splits(name: str, settings: list[str], printer: str) -> None:
+def test_fill_has_the_most_cells_of_all_splits(name, settings, printer):
     table = {"moulds.printer": printer, "moulds.cavities": "fill"}
     spec = load(load(name, settings), table)
     most = [int(bed // spec.diameter_mm) + 1 for bed in (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm)]
@@ -75,7 +72,7 @@ def test_fill_has_the_most_cells_of_all_splits(name: str, settings: list[str], p
     assert cells == max(map(math.prod, larger))
 
 
-def test_a_unit_larger_than_the_bed_fills_nothing() -> None:
+def test_a_unit_larger_than_the_bed_fills_nothing():
     with pytest.raises(Refusal, match="with one cavity"):
         set_of("embedded", 'moulds.cavities="fill"', "moulds.bed_x_mm=30")
 
@@ -83,32 +80,32 @@ def test_a_unit_larger_than_the_bed_fills_nothing() -> None:
 @pytest.mark.parametrize(
     ("name", "asked", "nearest"), [("encapsulating", "[3,2]", [2, 2]), ("pass-through", "[2,3]", [1, 3])]
 )
-def test_a_tail_reaches_an_edge(name: str, asked: str, nearest: list[int]) -> None:
+def test_a_tail_reaches_an_edge(name, asked, nearest):
     with pytest.raises(Refusal) as refused:
         set_of(name, f"moulds.cavities={asked}")
     assert refused.value.nearest == nearest
     set_of(name, f"moulds.cavities={nearest}")
 
 
-def test_without_tails_any_number_of_columns() -> None:
+def test_without_tails_any_number_of_columns():
     assert len(set_of(LEADLESS, "moulds.cavities=[4,2]").plan.layout.cells) == 8
 
 
 @pytest.mark.parametrize("set_by_hand", [("moulds.bed_z_mm=8",), ("moulds.plate_mm=30", "moulds.bed_z_mm=25")])
-def test_a_piece_higher_than_the_printer(set_by_hand: tuple[str, ...]) -> None:
+def test_a_piece_higher_than_the_printer(set_by_hand):
     with pytest.raises(Refusal, match=r"moulds\.bed_z_mm") as refused:
         set_of("encapsulating", *set_by_hand)
     set_of("encapsulating", *set_by_hand, f"moulds.bed_z_mm={refused.value.nearest}")
 
 
-def test_a_length_beyond_the_printer_s_height_is_the_one_refused() -> None:
+def test_a_length_beyond_the_printer_s_height_is_the_one_refused():
     with pytest.raises(Refusal, match=r"the tallest piece has .* \(moulds\.bed_z_mm\) is 220 mm") as refused:
         set_of("encapsulating", "layers.1.cap_mm=500")
     assert refused.value.field == "layers.1.cap_mm"
     set_of("encapsulating", f"layers.1.cap_mm={refused.value.nearest}")
 
 
-def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> None:
+def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other():
     moulds = set_of(LEADLESS, "moulds.cavities=[5,4]")
     names = [cell.name for cell in moulds.plan.layout.cells]
     assert names == [f"{i + 1:02X}" for i in range(20)]
@@ -122,7 +119,7 @@ def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> Non
 
 @pytest.mark.parametrize("wall", [0.5, 0.55, 0.6, 0.7, 0.85, 0.95])
 @pytest.mark.parametrize("tolerance", [0.002, 0.1])
-def test_grooves_that_just_miss_each_other_are_joined(wall: float, tolerance: float) -> None:
+def test_grooves_that_just_miss_each_other_are_joined(wall, tolerance):
     """The pitch is the last layer's; grooves of the one before leave a web of 2 * wall - 1 mm, which is not printed."""
     data = {
         "name": "webs",
@@ -149,7 +146,7 @@ def test_grooves_that_just_miss_each_other_are_joined(wall: float, tolerance: fl
         assert (land.translate((cell.x, cell.y)) - section).area() < 1e-3
 
 
-def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
+def test_flat_lid_without_vents_traps_what_an_exact_integral_says():
     """A disc of radius r with a sprue of radius a in the middle: tan(t) times the integral of (x - a) over x > a."""
     moulds = set_of("encapsulating", "moulds.pour=injected")
     step = moulds.plan.steps[1]
@@ -172,7 +169,7 @@ def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
 
 
 @pytest.mark.parametrize("count", [8, 12, 16])
-def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
+def test_measured_pocket_between_vents_is_the_formula(count):
     """Without a tongue, whose dent would be the deeper one; polygons stand for circles within 5 um."""
     moulds = set_of(LEADLESS, "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
     step = moulds.plan.steps[0]
@@ -183,20 +180,20 @@ def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
     )
 
 
-def test_vents_that_cannot_clear_say_how_many_would() -> None:
+def test_vents_that_cannot_clear_say_how_many_would():
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", "moulds.pour=injected", "moulds.vents=4")
     assert refused.value.nearest == 8
     assert "8 would clear it" in str(refused.value)
 
 
-def test_vents_come_in_fours() -> None:
+def test_vents_come_in_fours():
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", "moulds.pour=injected", "moulds.vents=9")
     assert refused.value.nearest == 8
 
 
-def test_a_ring_too_narrow_for_a_vent() -> None:
+def test_a_ring_too_narrow_for_a_vent():
     with pytest.raises(Refusal) as refused:
         set_of("embedded", "moulds.pour=injected", "layers.0.wall_mm=0.7")
     assert (refused.value.field, refused.value.nearest) == ("layers.0.wall_mm", 1.0)
@@ -204,7 +201,7 @@ def test_a_ring_too_narrow_for_a_vent() -> None:
 
 @pytest.mark.parametrize("design", ["encapsulating", "embedded"])
 @pytest.mark.parametrize("count", [1, 2, 4])
-def test_wires_keep_every_law(design: str, count: int) -> None:
+def test_wires_keep_every_law(design, count):
     data = wired(design)
     moulds = of_spec(from_data({**data, "wires": {**WIRES, "count": count}}))
     assert broken(moulds) == set()
@@ -216,7 +213,7 @@ def test_wires_keep_every_law(design: str, count: int) -> None:
             assert solids[f"wire{i + 1}"].min_gap(solids[layer], 1) > 0.09
 
 
-def test_wires_that_cannot_be() -> None:
+def test_wires_that_cannot_be():
     with pytest.raises(Refusal, match="leave out"):
         from_data({**read("encapsulating"), "wires": WIRES})
     with pytest.raises(Refusal, match="half the motor") as refused:
@@ -229,7 +226,7 @@ def test_wires_that_cannot_be() -> None:
     assert refused.value.nearest == "open"
 
 
-def test_a_connector_that_would_tear_the_slot() -> None:
+def test_a_connector_that_would_tear_the_slot():
     with pytest.raises(Refusal, match="would stretch it by") as refused:
         load("encapsulating", {"fpcb.tail_end_width_mm": 14.0})
     nearest = refused.value.nearest
@@ -250,7 +247,7 @@ def test_a_connector_that_would_tear_the_slot() -> None:
         (["moulds.window_clearance_mm=5"], "moulds.window_clearance_mm", 0.36),
     ],
 )
-def test_nearest_value_leads_out(overrides: list[str], field: str, nearest: object) -> None:
+def test_nearest_value_leads_out(overrides, field, nearest):
     """What is offered is no nonsense: put in, it meets no limit of its own again."""
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", *overrides)
@@ -263,7 +260,7 @@ def test_nearest_value_leads_out(overrides: list[str], field: str, nearest: obje
 
 
 @pytest.mark.parametrize("wall", [0.6, 0.713, 0.8])
-def test_the_widest_tail_that_a_tongue_s_air_allows_is_offered(wall: float) -> None:
+def test_the_widest_tail_that_a_tongue_s_air_allows_is_offered(wall):
     change = {"layers.0.wall_mm": wall, "layers.0.cap_mm": 1.1, "fpcb.tail_width_mm": 5.5}
     with pytest.raises(Refusal, match="mm of air under the tongue") as refused:
         plan(load("encapsulating", change))

@@ -1,11 +1,8 @@
 """gmsh as a real client of the STEP files: the same solids, the same volumes."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +14,7 @@ pytestmark = pytest.mark.skipif(shutil.which("gmsh") is None, reason="gmsh is no
 pytest.importorskip("build123d")
 
 
-def read(path: Path) -> list[float]:
+def read(path):
     """Volumes of the solids of a STEP file in mm3, as gmsh finds them."""
     script = path.with_suffix(".geo")
     script.write_text(
@@ -35,7 +32,7 @@ def read(path: Path) -> list[float]:
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "embedded"])
-def test_same_solids_and_volumes(name: str, tmp_path: Path) -> None:
+def test_same_solids_and_volumes(name, tmp_path):
     variant = Variant(load(name, ["output.formats=['step']"]))
     folder = build(variant.spec, tmp_path, only=("unit", "moulds"), check=False).folder
     there = [read((folder / file).resolve()) for file in ("unit.step", "moulds/moulds.step")]

@@ -1,10 +1,7 @@
 """Motor and circuit that are laid into the mould before a pour, and stay: the film-closed unit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from faulty_sets import broken, of_spec, with_fault
@@ -14,7 +11,6 @@ from unitcad.casting.procedure_text import to_markdown
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import bounds
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.pipeline.write import build
 from unitcad.shape import box, cut, moved
@@ -24,7 +20,7 @@ FILM = templates()["embedded"].parent / "custom" / "film-closed.toml"
 CODE = FILM.with_suffix(".py").read_text("utf-8")
 
 
-def altered(folder: Path, old: str, new: str, *changes: str) -> MouldSet:
+def altered(folder, old, new, *changes):
     """Return the mould set of the film-closed unit with something of its code put otherwise."""
     assert old in CODE
     (folder / "film-closed.py").write_text(CODE.replace(old, new))
@@ -32,7 +28,7 @@ def altered(folder: Path, old: str, new: str, *changes: str) -> MouldSet:
     return of_spec(load(folder / "film.toml", changes))
 
 
-def test_silicone_motor_and_circuit_fill_the_disc() -> None:
+def test_silicone_motor_and_circuit_fill_the_disc():
     """Film, body, motor and circuit within the outer radius are the whole cylinder, computed on its polygon."""
     moulds = of_spec(load(FILM))
     radius, top = moulds.dimensions.outer_radius, moulds.dimensions.heights[-1]
@@ -46,11 +42,11 @@ def test_silicone_motor_and_circuit_fill_the_disc() -> None:
 @pytest.mark.parametrize(
     "changes", [[], ["moulds.cavities=[1,2]"], ['fpcb.tail="both"'], ["moulds.printer=sla"], ["layers.0.cap_mm=0.8"]]
 )
-def test_a_film_closed_unit_keeps_every_check(changes: list[str]) -> None:
+def test_a_film_closed_unit_keeps_every_check(changes):
     assert [finding for finding in check_moulds(of_spec(load(FILM, changes))) if not finding.ok] == []
 
 
-def test_the_cup_has_a_slot_over_the_tail_and_the_base_carries_it() -> None:
+def test_the_cup_has_a_slot_over_the_tail_and_the_base_carries_it():
     """Without the slot the cup stands in the tail; without the base's rib silicone leaves under the tail."""
     moulds = of_spec(load(FILM))
     tail = moulds.plan.steps[1].inserts[1].shape
@@ -61,14 +57,14 @@ def test_the_cup_has_a_slot_over_the_tail_and_the_base_carries_it() -> None:
     assert "C100" in broken(flat)
 
 
-def _whole(moulds: MouldSet):
+def _whole(moulds):
     from unitcad.moulds.cup import cup
 
     spec, dims = moulds.spec, replace(moulds.plan.dimensions, exit=None)
     return cup(spec, dims, moulds.plan.layout, 1)
 
 
-def test_it_is_laid_in_between_the_pours(tmp_path: Path) -> None:
+def test_it_is_laid_in_between_the_pours(tmp_path):
     done = build(load(FILM, {"output.formats": ["stl"]}), tmp_path, only=("unit", "moulds", "casting"))
     assert done.ok
     text = (done.folder / "casting.md").read_text("utf-8")
@@ -83,7 +79,7 @@ def test_it_is_laid_in_between_the_pours(tmp_path: Path) -> None:
     assert (kinds["motor"], kinds["fpcb"], kinds["layer1"]) == ("bought", "bought", "cast")
 
 
-def test_its_words_are_those_of_its_tools() -> None:
+def test_its_words_are_those_of_its_tools():
     """A groove only where the cup has one, no walls of rings, and what is laid in is not on the scale."""
     moulds = of_spec(load(FILM))
     casting = procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], 0.0)
@@ -107,7 +103,7 @@ def test_its_words_are_those_of_its_tools() -> None:
     assert "petroleum jelly" in {item.item for item in casting.bill}
 
 
-def test_pictures_show_it_laid_in() -> None:
+def test_pictures_show_it_laid_in():
     moulds = of_spec(load(FILM))
     parts = [(moment.title, set(moment.parts)) for moment in moments(moulds)]
     first = next(i for i, (_, there) in enumerate(parts) if "motor" in there)
@@ -118,7 +114,7 @@ def test_pictures_show_it_laid_in() -> None:
     assert list(unit_apart(moulds)) == ["layer1", "motor", "fpcb", "layer2"]
 
 
-def test_what_can_not_be_laid_in_is_refused(tmp_path: Path) -> None:
+def test_what_can_not_be_laid_in_is_refused(tmp_path):
     with pytest.raises(Refusal, match=r"pour 2 can't be cast: an insert reaches above the rim at z = 2\.485 mm") as bad:
         altered(tmp_path, "film + inside + cap", "film + inside - 0.5 * cap")
     assert "--only unit" in str(bad.value)

@@ -1,7 +1,5 @@
 """Cups so low that the letters of their label are as deep as the overflow groove."""
 
-from __future__ import annotations
-
 import pytest
 
 from unitcad.checks import check_moulds
@@ -10,7 +8,7 @@ from unitcad.validation import from_data
 
 
 @pytest.mark.parametrize("height", [1.0, 1.033, 1.1, 1.2, 1.3, 1.39, 1.5, 1.61])
-def test_walls_of_a_low_cup_are_whole(height: float) -> None:
+def test_walls_of_a_low_cup_are_whole(height):
     """At 1.03 mm groove and letters are 0.4 mm deep: letters 0.63 mm off the groove broke C230.
 
     At 1.2 mm the groove's floor is 0.6 mm thick, which broke C240.

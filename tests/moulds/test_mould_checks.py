@@ -1,9 +1,6 @@
 """Every mould check passes for every template, and each catches the faults planted in a tool's tree."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -14,15 +11,13 @@ from unitcad.errors import Refusal
 from unitcad.moulds import lid
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Removal
-from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
+from unitcad.shape import box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.tree import Common, Revolve
 from unitcad.validation import from_data, templates
 
-Fault = tuple[str, str, str, Callable[[Shape], Shape]]
-
 
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_every_template_passes_every_mould_check(name: str) -> None:
+def test_every_template_passes_every_mould_check(name):
     findings = check_moulds(set_of(name))
     assert [finding for finding in findings if not finding.ok] == []
     assert {finding.code for finding in findings} == set(mould_checks())
@@ -30,13 +25,13 @@ def test_every_template_passes_every_mould_check(name: str) -> None:
     assert max(balance) < 1e-12
 
 
-def test_a_crevice_of_rounding_is_no_pocket() -> None:
+def test_a_crevice_of_rounding_is_no_pocket():
     """Two wide tongues: between a tip and the ledge's riser a film of 1e-16 mm stays, which holds no air."""
     findings = check_moulds(set_of("encapsulating", "fpcb.tail=both", "fpcb.tail_width_mm=6.0"))
     assert [finding for finding in findings if not finding.ok] == []
 
 
-def test_a_wedge_that_a_union_of_many_loses_is_no_leak() -> None:
+def test_a_wedge_that_a_union_of_many_loses_is_no_leak():
     """One of 10,000 random specs: with a circle in 328 sides, manifold3d's union of the tools lacks 0.025 mm3."""
     layers = [
         {"material": "ecoflex-00-50", "wall_mm": 0.5, "cap_mm": 10.0},
@@ -68,24 +63,24 @@ def test_a_wedge_that_a_union_of_many_loses_is_no_leak() -> None:
     ],
 )
 @pytest.mark.parametrize("name", ["encapsulating", "embedded"])
-def test_variants_pass_every_mould_check(name: str, overrides: list[str]) -> None:
+def test_variants_pass_every_mould_check(name, overrides):
     assert broken(set_of(name, *overrides)) == set()
 
 
-def less(*tools: Shape) -> Callable[[Shape], Shape]:
+def less(*tools):
     return lambda shape: cut(shape, tools)
 
 
-def more(*parts: Shape) -> Callable[[Shape], Shape]:
+def more(*parts):
     return lambda shape: union((shape, *parts))
 
 
-def shifted(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[Shape], Shape]:
+def shifted(x=0.0, y=0.0, z=0.0):
     return lambda shape: moved(shape, x, y, z)
 
 
 # The encapsulating template: core of radius 4.5 up to 2.11, bores 5.75 and 7, rims 3.36 and 4.61, slot 1.8 to 2.2.
-FAULTS: list[Fault] = [
+FAULTS = [
     ("C000", "cup1", "empty", lambda shape: Common((box(0, 1, 0, 1, 0, 1), box(2, 3, 2, 3, 2, 3)))),
     ("C000", "cup1", "in two pieces", less(box(-99, 99, 9, 9.5, -99, 99))),
     ("C000", "cup2", "window closed", more(box(8, 10, -3, 3, 1.5, 2.7))),
@@ -135,20 +130,20 @@ FAULTS: list[Fault] = [
 
 
 @pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
-def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Callable[[Shape], Shape]) -> None:
+def test_a_planted_fault_is_caught(code, tool, what, change):
     assert code in broken(with_fault(set_of("encapsulating"), tool, change)), what
 
 
-def test_every_check_has_a_planted_fault() -> None:
+def test_every_check_has_a_planted_fault():
     # A bar inside the template's layer does not stretch it by its limit: C310 has closed forms below.
     assert {fault[0] for fault in FAULTS} | {"C310"} == set(mould_checks())
 
 
-def test_a_forgotten_tongue_is_a_leak() -> None:
+def test_a_forgotten_tongue_is_a_leak():
     assert "C100" in broken(without(set_of("encapsulating"), "tongue"))
 
 
-def test_an_unpulled_tongue_holds_the_cup() -> None:
+def test_an_unpulled_tongue_holds_the_cup():
     """Out of the procedure's order: the cup can't go up while its tongue is in."""
     from unitcad.checks.draw import blocked_area
 
@@ -157,7 +152,7 @@ def test_an_unpulled_tongue_holds_the_cup() -> None:
     assert blocked_area(solids["tongue"], solids["cup1"], (1, 0, 0)) == 0
 
 
-def reordered(moulds: MouldSet, index: int, change: Callable[[tuple[Removal, ...]], tuple[Removal, ...]]) -> MouldSet:
+def reordered(moulds, index, change):
     """Return the set with other removals after one pour (from 0)."""
     steps = tuple(
         replace(step, removals=change(step.removals)) if i == index else step
@@ -179,19 +174,17 @@ def reordered(moulds: MouldSet, index: int, change: Callable[[tuple[Removal, ...
         (1, lambda order: (Removal(CAST, (0, 0, 1)), *order), "pour 2: cast out against tongue", "undercut"),
     ],
 )
-def test_an_order_of_removal_that_is_impossible_is_caught(
-    index: int, change: Callable[[tuple[Removal, ...]], tuple[Removal, ...]], where: str, why: str
-) -> None:
+def test_an_order_of_removal_that_is_impossible_is_caught(index, change, where, why):
     findings = check_moulds(reordered(set_of("encapsulating"), index, change))
     named = [finding for finding in findings if finding.code == "C300" and not finding.ok]
     assert where in [finding.where for finding in named]
     assert why in " ".join(finding.advice for finding in named if finding.where == where)
 
 
-def test_a_unit_that_is_pushed_out_last_holds_nothing() -> None:
+def test_a_unit_that_is_pushed_out_last_holds_nothing():
     """The silicone comes out by itself: neither base nor cup holds it any more, whatever is left on the bench."""
 
-    def pushed(order: tuple[Removal, ...]) -> tuple[Removal, ...]:
+    def pushed(order):
         down = (0, 0, -1)
         return (order[0], Removal("filament", down), Removal("base", down), Removal(CAST, down))
 
@@ -200,7 +193,7 @@ def test_a_unit_that_is_pushed_out_last_holds_nothing() -> None:
 
 
 @pytest.mark.parametrize(("reach", "sides"), [(5.5, 1), (6.7, 1), (6.7, 2)])
-def test_the_peel_over_a_bar_printed_on_the_core(reach: float, sides: int) -> None:
+def test_the_peel_over_a_bar_printed_on_the_core(reach, sides):
     """The hull of a circle and one or two bars in closed form: tangents, arcs and the bars' ends."""
     radius, half = 4.5, 1.7
     bars = [box(min(0, s * reach), max(0, s * reach), -half, half, 1.805, 2.0) for s in (1, -1)[:sides]]
@@ -219,7 +212,7 @@ def test_the_peel_over_a_bar_printed_on_the_core(reach: float, sides: int) -> No
     assert "no more than" in findings[0].advice
 
 
-def test_strain_within_the_margin_is_kept() -> None:
+def test_strain_within_the_margin_is_kept():
     bar = box(0, 5.75, -1.7, 1.7, 1.805, 2.0)
     findings = check_moulds(with_fault(set_of("encapsulating"), "base", more(bar)))
     assert all(f.ok for f in findings if f.code == "C310")
@@ -227,7 +220,7 @@ def test_strain_within_the_margin_is_kept() -> None:
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "pass-through"])
-def test_chain_pad_through_the_slot_needs_124_percent(name: str) -> None:
+def test_chain_pad_through_the_slot_needs_124_percent(name):
     """The circuit's pad of 8.4 through the slot of 3.4 by 0.4: 2 (8.4 + 0.11) over 2 (3.4 + 0.4), less one."""
     findings = check_moulds(set_of(name, "fpcb.tail_end_width_mm=8.4"))
     value = next(f.value for f in findings if f.where == "tail through the slot")
@@ -235,7 +228,7 @@ def test_chain_pad_through_the_slot_needs_124_percent(name: str) -> None:
     assert round(value) == 124
 
 
-def test_air_under_a_tongue_is_the_formulas() -> None:
+def test_air_under_a_tongue_is_the_formulas():
     """The widest tail that the ledge leaves: C400 measures what lengths say; on thin walls it is refused."""
     moulds = set_of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
     measured = [f.value for f in check_moulds(moulds) if f.code == "C400"]

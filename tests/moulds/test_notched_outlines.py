@@ -3,16 +3,12 @@
 The notch's end lies in an outer face that the kernel cut it from, so that rounding leaves films in that face.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from faulty_sets import broken, of_spec
-from manifold3d import Manifold
 
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import arrays
@@ -68,7 +64,7 @@ OUTLINES = {
 }
 
 
-def written(folder: Path, outline: str, lift: float = 0.2, angle: float = 0.0) -> Path:
+def written(folder, outline, lift=0.2, angle=0.0):
     """Write a design with a notch in a direction, and its spec: the circuit's tail leads along +x only."""
     code = CODE.replace("OUTLINE", OUTLINES[outline]).replace("LIFT", str(lift)).replace("ANGLE", str(angle))
     (folder / "d.py").write_text(code)
@@ -76,7 +72,7 @@ def written(folder: Path, outline: str, lift: float = 0.2, angle: float = 0.0) -
     return folder / "d.toml"
 
 
-def upright_surface(solid: Manifold) -> float:
+def upright_surface(solid):
     """Return the surface of a solid of level and upright faces that stands on one face, mm2, from its sections."""
     heights = sorted({float(z) for z in arrays(solid)[0][:, 2]})
     walls = 0.0
@@ -88,7 +84,7 @@ def upright_surface(solid: Manifold) -> float:
 
 @pytest.mark.parametrize(("lift", "angle"), [(0.2, 0.0), (0.0, 23.0), (0.2, 200.0)])
 @pytest.mark.parametrize("outline", OUTLINES)
-def test_a_notch_keeps_every_check(outline: str, lift: float, angle: float, tmp_path: Path) -> None:
+def test_a_notch_keeps_every_check(outline, lift, angle, tmp_path):
     moulds = of_spec(load(written(tmp_path, outline, lift, angle)))
     assert broken(moulds) == set()
     assert moulds.plan.dimensions.core_height == mm(2.11 + lift)  # no film up to the top counts
@@ -102,7 +98,7 @@ def test_a_notch_keeps_every_check(outline: str, lift: float, angle: float, tmp_
 
 @pytest.mark.long
 @pytest.mark.parametrize("outline", OUTLINES)
-def test_occt_draws_the_same_tools(outline: str, tmp_path: Path) -> None:
+def test_occt_draws_the_same_tools(outline, tmp_path):
     occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
     spec = load(written(tmp_path, outline))
     for tool in complement(spec, cast_layers(spec)).tools:
@@ -111,7 +107,7 @@ def test_occt_draws_the_same_tools(outline: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("formats", [["stl"], ["stl", "step"]])
-def test_a_notched_disc_is_built_whole(formats: list[str], tmp_path: Path) -> None:
+def test_a_notched_disc_is_built_whole(formats, tmp_path):
     if "step" in formats:
         pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
     done = build(load(written(tmp_path, "disc"), {"output.formats": formats}), tmp_path / "out")

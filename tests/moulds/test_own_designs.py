@@ -1,7 +1,5 @@
 """A Design object in a user's file is honoured like a shipped one, with tooling of its own too."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -39,20 +37,20 @@ DESIGN = Design(name="plain", about="a ring", layers=layers, dimensions=dimensio
 """
 
 
-def written(folder: Path, code: str, spec: str = SPEC) -> Path:
+def written(folder, code, spec=SPEC):
     """Write a design and its spec."""
     (folder / "own.py").write_text(code)
     (folder / "spec.toml").write_text(spec)
     return folder / "spec.toml"
 
 
-def stl_files(folder: Path) -> dict[str, bytes]:
+def stl_files(folder):
     """Return the STL files of a result without their headers, which hold names."""
     return {str(file.relative_to(folder)): file.read_bytes()[80:] for file in sorted(folder.rglob("*.stl"))}
 
 
 @pytest.mark.parametrize("template", ["embedded", "single-embedded"])
-def test_a_copy_of_a_shipped_design_gives_the_same_files(template: str, tmp_path: Path) -> None:
+def test_a_copy_of_a_shipped_design_gives_the_same_files(template, tmp_path):
     text = templates()[template].read_text("utf-8")
     copy = written(tmp_path, EMBEDDED, text.replace('design = "embedded"', 'design = "own.py:DESIGN"'))
     change = {"output.formats": ["stl"]}
@@ -68,7 +66,7 @@ def test_a_copy_of_a_shipped_design_gives_the_same_files(template: str, tmp_path
     assert levels[0] == levels[1]
 
 
-def test_a_design_s_limits_are_the_spec_s(tmp_path: Path) -> None:
+def test_a_design_s_limits_are_the_spec_s(tmp_path):
     with pytest.raises(Refusal, match=r"layers\.0\.cap_mm = 1: an embedded layer is an open ring"):
         load(written(tmp_path, EMBEDDED), {"layers.0.cap_mm": 1.0})
 
@@ -103,7 +101,7 @@ DESIGN = Design(name="sleeve", about="a ring", layers=layers, dimensions=dimensi
 """
 
 
-def test_a_design_s_own_tooling_is_checked_like_any_other(tmp_path: Path) -> None:
+def test_a_design_s_own_tooling_is_checked_like_any_other(tmp_path):
     """The core has a blind hole, which no shipped tooling has: its volume is the hole's."""
     path = written(tmp_path, SLEEVE.replace("RELIEF", "1"))
     for cavities in ([1, 1], [2, 1]):
@@ -120,7 +118,7 @@ def test_a_design_s_own_tooling_is_checked_like_any_other(tmp_path: Path) -> Non
     assert {"moulds/base.stl", "moulds/step1-cup.stl", "casting.md"} <= set(done.manifest["files"])
 
 
-def test_a_core_too_small_in_a_design_s_own_tooling_is_found(tmp_path: Path) -> None:
+def test_a_core_too_small_in_a_design_s_own_tooling_is_found(tmp_path):
     narrow = SLEEVE.replace("cylinder(dims.cavity_radius, -1, rim)", "cylinder(dims.cavity_radius - 0.2, -1, rim)")
     assert "C100" in broken(of_spec(load(written(tmp_path, narrow.replace("RELIEF", "1")))))
 
@@ -138,7 +136,7 @@ def test_a_core_too_small_in_a_design_s_own_tooling_is_found(tmp_path: Path) -> 
         ("limits=lambda spec, dims: spec.nothing", r"own.py:DESIGN \(line 12\): AttributeError"),
     ],
 )
-def test_what_a_design_has_wrong_is_one_sentence(more: str, why: str, tmp_path: Path) -> None:
+def test_what_a_design_has_wrong_is_one_sentence(more, why, tmp_path):
     with pytest.raises(UnitcadError, match=why):
         build(load(written(tmp_path, PLAIN.replace("MORE", more))), tmp_path / "out")
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").glob("own*"))
@@ -155,12 +153,12 @@ def test_what_a_design_has_wrong_is_one_sentence(more: str, why: str, tmp_path: 
         ("return concentric(spec, spec.motor.thickness_mm, None)", "return 1", "dimensions returns a int"),
     ],
 )
-def test_what_a_tooling_lacks_is_one_sentence(old: str, new: str, why: str, tmp_path: Path) -> None:
+def test_what_a_tooling_lacks_is_one_sentence(old, new, why, tmp_path):
     assert old in SLEEVE
     with pytest.raises(UnitcadError, match=f"design own.py:DESIGN: {why}"):
         of_spec(load(written(tmp_path, SLEEVE.replace("RELIEF", "1").replace(old, new))))
 
 
-def test_a_lid_needs_tooling_that_has_one(tmp_path: Path) -> None:
+def test_a_lid_needs_tooling_that_has_one(tmp_path):
     with pytest.raises(UnitcadError, match="its tooling has no lid1"):
         of_spec(load(written(tmp_path, SLEEVE.replace("RELIEF", "1")), {"moulds.pour": "injected"}))

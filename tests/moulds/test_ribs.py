@@ -1,9 +1,6 @@
 """The ribs that centre a cup: where they stand, and what they do to its eccentricity."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -17,7 +14,7 @@ from unitcad.errors import Refusal
 from unitcad.moulds.base import draw_taper
 from unitcad.moulds.cup import rib_shapes, ribs, skirt_end, slot_shapes
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape import Common, Shape, box, cut, union
+from unitcad.shape import Common, box, cut, union
 from unitcad.validation import templates
 
 SETS = [
@@ -34,7 +31,7 @@ SETS = [
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_ribs_stay_clear_of_cavity_windows_tongues_and_pry_slots(source: tuple[str, ...]) -> None:
+def test_ribs_stay_clear_of_cavity_windows_tongues_and_pry_slots(source):
     """Measured between meshes: half a millimetre to whatever else the cup touches or lets through."""
     moulds = set_of(*source)
     (standing,) = [moulds.meshes(rib_shapes(moulds.spec, moulds.plan.layout))]
@@ -48,7 +45,7 @@ def test_ribs_stay_clear_of_cavity_windows_tongues_and_pry_slots(source: tuple[s
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_the_crushed_volume_is_that_of_the_crests(source: tuple[str, ...]) -> None:
+def test_the_crushed_volume_is_that_of_the_crests(source):
     """What base and cup share, by the trapezium of a crest: its height x depth x (line + depth), and its two ramps."""
     moulds = set_of(*source)
     line, depth = float(printers()[moulds.spec.moulds.printer].least_feature_mm), moulds.spec.moulds.rib_interference_mm
@@ -61,7 +58,7 @@ def test_the_crushed_volume_is_that_of_the_crests(source: tuple[str, ...]) -> No
         assert (moulds.pressed[step.cup] ^ moulds.solids["base"]).volume() < 1e-9
 
 
-def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press() -> None:
+def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press():
     """The cup is let go at its place and moved by each rib's force until nothing moves it: no algebra in common."""
     moulds = set_of("embedded", "moulds.cavities=[2,2]")
     standing, depth = ribs(moulds.spec, moulds.plan.layout), 0.1
@@ -87,7 +84,7 @@ def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press() -> None:
 
 @pytest.mark.parametrize("name", sorted(templates()))
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
-def test_ribs_leave_a_fifth_of_the_eccentricity(name: str, printer: str) -> None:
+def test_ribs_leave_a_fifth_of_the_eccentricity(name, printer):
     moulds = set_of(name, f"moulds.printer={printer}")
     without, made = eccentricity(moulds, with_ribs=False), eccentricity(moulds)
     assert without.as_drawn_mm == pytest.approx(math.sqrt(2) * moulds.spec.moulds.plinth_clearance_mm)
@@ -95,12 +92,12 @@ def test_ribs_leave_a_fifth_of_the_eccentricity(name: str, printer: str) -> None
     assert made.at_worst_mm < 0.3 * without.at_worst_mm
 
 
-def test_ribs_too_low_for_the_play_leave_the_rest_of_it() -> None:
+def test_ribs_too_low_for_the_play_leave_the_rest_of_it():
     made = eccentricity(set_of("encapsulating", "moulds.rib_interference_mm=0.02"))
     assert made.at_worst_mm == pytest.approx(math.sqrt(2) * 0.13)
 
 
-def test_no_ribs_where_none_are_asked_for() -> None:
+def test_no_ribs_where_none_are_asked_for():
     for printer in ("sla", "fdm-0.4"):
         moulds = set_of("encapsulating", "moulds.rib_interference_mm=0", f"moulds.printer={printer}")
         assert moulds.spec.moulds.plinth_height_mm == 2.0
@@ -110,14 +107,14 @@ def test_no_ribs_where_none_are_asked_for() -> None:
         assert eccentricity(moulds).ribs == 0
 
 
-def test_a_rib_wider_into_the_plinth_than_half_a_line_is_refused() -> None:
+def test_a_rib_wider_into_the_plinth_than_half_a_line_is_refused():
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", "moulds.rib_interference_mm=0.25")
     assert (refused.value.field, refused.value.nearest) == ("moulds.rib_interference_mm", 0.2)
     assert broken(set_of("encapsulating", "moulds.rib_interference_mm=0.2")) == set()
 
 
-def test_a_resin_cup_s_leaves_bend_within_the_limit_and_into_their_slots() -> None:
+def test_a_resin_cup_s_leaves_bend_within_the_limit_and_into_their_slots():
     """By the beam's closed formula: 1.5 x 0.5 x 0.13 / 3.06^2, the arm from the crest's measured top to the seat."""
     moulds = set_of("encapsulating", "moulds.printer=sla")
     rib = ribs(moulds.spec, moulds.plan.layout)[0]
@@ -130,12 +127,12 @@ def test_a_resin_cup_s_leaves_bend_within_the_limit_and_into_their_slots() -> No
         assert room.value == pytest.approx(0.5, abs=0.005)
 
 
-def _leaf_broken(change: Callable[[Shape], Shape]) -> set[str]:
+def _leaf_broken(change):
     moulds = with_fault(set_of("encapsulating", "moulds.printer=sla"), "cup1", change)
     return {f.where for f in check_moulds(moulds) if f.code == "C220" and not f.ok}
 
 
-def test_faults_of_a_leaf_are_found() -> None:
+def test_faults_of_a_leaf_are_found():
     """A slot that ends low, one that a flaw fills, a leaf twice as thick, and one that is not freed at one side."""
     moulds = set_of("encapsulating", "moulds.printer=sla")
     slots, rib = slot_shapes(moulds.spec, moulds.plan.layout)[0], ribs(moulds.spec, moulds.plan.layout)[0]
@@ -143,7 +140,7 @@ def test_faults_of_a_leaf_are_found() -> None:
     x, y = rib.x, rib.y
     recess = draw_taper(moulds.plan.layout, moulds.spec.moulds.plinth_clearance_mm, skirt_end(moulds.spec))
 
-    def filled(*space: float) -> Callable[[Shape], Shape]:
+    def filled(*space):
         return lambda shape: union((shape, cut(Common((slots, box(*space))), [recess])))
 
     assert _leaf_broken(filled(-20, 20, -20, 20, -1.0, 0.0)) == {strain}
@@ -152,7 +149,7 @@ def test_faults_of_a_leaf_are_found() -> None:
     assert _leaf_broken(filled(x - 0.2, x + 2, y + 1.2, y + 2, -9, 0.0)) == {strain, room}
 
 
-def test_a_plinth_too_low_for_the_leaves_is_refused() -> None:
+def test_a_plinth_too_low_for_the_leaves_is_refused():
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", "moulds.printer=sla", "moulds.plinth_height_mm=2")
     assert refused.value.field == "moulds.plinth_height_mm"
@@ -160,7 +157,7 @@ def test_a_plinth_too_low_for_the_leaves_is_refused() -> None:
     assert broken(set_of("encapsulating", "moulds.printer=sla", nearest)) == set()
 
 
-def test_a_printer_of_ones_own_without_the_key_has_none() -> None:
+def test_a_printer_of_ones_own_without_the_key_has_none():
     from unitcad.validation import from_data, read
 
     entry = {

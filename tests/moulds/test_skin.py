@@ -94,8 +94,13 @@ def test_refused_with_a_value_that_is_accepted():
     with pytest.raises(Refusal) as refused:
         load("encapsulating", ["skin_mm=0.1"])
     assert (refused.value.field, refused.value.nearest) == ("skin_mm", 0.3)
+    custom = str(Path(__file__).parents[2] / "templates/custom/strap-lugs.toml")
     with pytest.raises(Refusal, match="draws its own skin side"):
-        load(str(Path(__file__).parents[2] / "templates/custom/strap-lugs.toml"), ["skin_mm=0.5"])
+        load(custom, ["skin_mm=0.5"])
+    for key, value in (("moulds.draft_deg", 1.0), ("motor.lip_mm", 0.5)):
+        with pytest.raises(Refusal, match="moulds by complement follow the bodies") as refused:
+            load(custom, [f"{key}={value}"])
+        assert (refused.value.field, refused.value.nearest) == (key, 0.0)
 
 
 def test_the_estimate_is_said_to_be_that_of_the_open_unit():

@@ -1,7 +1,5 @@
 """PrusaSlicer as a real client: it takes every tool without a repair."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -157,7 +155,7 @@ def test_print_times_are_written_once_a_piece(tmp_path):
     """A second call takes what it knows; a changed piece is sliced again."""
     spec = load("single-embedded")
     built = build(spec, tmp_path, only=("moulds",), check=False)
-    said: list[str] = []
+    said = []
 
     def run():
         return slicer.slice_tools(spec, built.folder, built.manifest, said.append)

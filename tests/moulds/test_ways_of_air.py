@@ -1,7 +1,5 @@
 """The ways on which air leaves a cavity: drawn landscapes, and levels flooded one by one."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np
@@ -11,7 +9,7 @@ from unitcad.checks.air import _ways_out
 from unitcad.geometry.components import components
 
 
-def flooded(edges: np.ndarray, height: np.ndarray, opening: np.ndarray) -> list[float]:
+def flooded(edges, height, opening):
     """The highest level at which each vertex and an opening lie on one piece of what is not below it."""
     found = np.full(len(height), -np.inf)
     lowest = height[edges].min(axis=1)
@@ -22,7 +20,7 @@ def flooded(edges: np.ndarray, height: np.ndarray, opening: np.ndarray) -> list[
     return found.tolist()
 
 
-def test_air_goes_over_the_higher_of_two_saddles() -> None:
+def test_air_goes_over_the_higher_of_two_saddles():
     """Tops at 5, 7 and 6 with saddles at 2 and 3 between them; the opening is the last."""
     height = np.array([5.0, 2.0, 7.0, 3.0, 6.0])
     edges = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
@@ -34,7 +32,7 @@ def test_air_goes_over_the_higher_of_two_saddles() -> None:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_ways_out_are_those_of_flooded_levels(seed: int) -> None:
+def test_the_ways_out_are_those_of_flooded_levels(seed):
     pick = random.Random(seed)
     n = pick.randint(2, 60)
     height = np.array([pick.choice([pick.uniform(0, 9), pick.randint(0, 4)]) for _ in range(n)], float)

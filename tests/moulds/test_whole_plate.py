@@ -1,9 +1,5 @@
 """Gangs judged by one cell of each kind have the findings of the whole plate, sound and with planted faults."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import pytest
 from faulty_sets import set_of, with_fault
 from test_congruent_places import shown, whole_plate_cavity
@@ -12,12 +8,12 @@ from tests.sample_bodies import LEADLESS
 from unitcad.checks import check_moulds, groove_walls, overlap
 from unitcad.moulds.cavities import Cavity, united
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape import Shape, box, cut, cylinder, moved, union
+from unitcad.shape import box, cut, cylinder, moved, union
 
 BED = ("moulds.bed_x_mm=400", "moulds.bed_y_mm=400")
 
 
-def whole_plate_findings(moulds: MouldSet, monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
+def whole_plate_findings(moulds, monkeypatch):
     """Return what the checks find where no place stands for another and every cavity is that of the whole plate."""
     whole = MouldSet(moulds.spec, moulds.altered)
     whole.__dict__["cells"] = (tuple(range(len(moulds.plan.layout.cells))),) * len(moulds.plan.steps)
@@ -31,7 +27,7 @@ def whole_plate_findings(moulds: MouldSet, monkeypatch: pytest.MonkeyPatch) -> l
         return [shown(finding) for finding in check_moulds(whole)]
 
 
-def with_parts(moulds: MouldSet) -> list[tuple[Cavity, list]]:
+def with_parts(moulds):
     """Return each cell with the layer as drawn, and the hollows of its pour on the whole plate."""
     found, count = [], len(moulds.plan.layout.cells)
     for step in moulds.plan.steps:
@@ -42,7 +38,7 @@ def with_parts(moulds: MouldSet) -> list[tuple[Cavity, list]]:
     return found
 
 
-def reached_from(cavity: Cavity, parts: list):
+def reached_from(cavity, parts):
     """Return the part that holds most of a layer."""
     return max(parts, key=lambda part: (part ^ cavity.drawn).volume())
 
@@ -56,18 +52,18 @@ def reached_from(cavity: Cavity, parts: list):
         if columns * rows > 1
     ],
 )
-def test_a_gang_has_the_findings_of_its_whole_plate(columns: int, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gang_has_the_findings_of_its_whole_plate(columns, rows, monkeypatch):
     moulds = set_of(LEADLESS, f"moulds.cavities=[{columns},{rows}]", *BED)
     assert [shown(finding) for finding in check_moulds(moulds)] == whole_plate_findings(moulds, monkeypatch)
 
 
-def hole(x: float, y: float, radius: float = 0.6) -> Shape:
+def hole(x, y, radius=0.6):
     """Draw a hole through a cup."""
     return moved(cylinder(radius, -1, 20), x, y)
 
 
 # Cells stand 18 mm apart, the middle one at 0, 0.
-FAULTS: dict[str, tuple[str, str, Callable[[Shape], Shape]]] = {
+FAULTS = {
     "a lump in the middle cell": ("C100", "cup2", lambda s: union((s, box(-1, 1, 6.5, 7.2, 1, 2)))),
     "a lump in an edge cell": ("C100", "cup2", lambda s: union((s, box(-20, -18, 6.5, 7.2, 1, 2)))),
     "a lump in a corner cell": ("C100", "cup2", lambda s: union((s, box(17, 19, 24.5, 25.2, 1, 2)))),
@@ -88,7 +84,7 @@ FAULTS: dict[str, tuple[str, str, Callable[[Shape], Shape]]] = {
     "fault",
     [pytest.param(f, marks=[] if f.startswith("a hole between two") else [pytest.mark.long]) for f in FAULTS],
 )
-def test_a_planted_fault_has_the_findings_of_the_whole_plate(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_planted_fault_has_the_findings_of_the_whole_plate(fault, monkeypatch):
     code, tool, change = FAULTS[fault]
     moulds = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]", *BED), tool, change)
     found = [shown(finding) for finding in check_moulds(moulds)]

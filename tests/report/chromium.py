@@ -1,7 +1,5 @@
 """Debian's Chromium, driven by Playwright."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 from pathlib import Path
@@ -74,9 +72,9 @@ class Visit:
         if script:
             self.context.add_init_script(script)
         self.page = self.context.new_page()
-        self.console: list[str] = []
-        self.requests: list[str] = []
-        self.errors: list[str] = []
+        self.console = []
+        self.requests = []
+        self.errors = []
         self.page.on("console", lambda message: self.console.append(f"{message.type}: {message.text}"))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))

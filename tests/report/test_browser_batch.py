@@ -1,7 +1,5 @@
 """A batch's page in Chromium: sorting, filtering, paging, the plot, opening a variant; markup stays text."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np
@@ -27,7 +25,7 @@ def head(visit, name):
 
 
 def test_markup_stays_text(visit, hostile):
-    asked: list[str] = []
+    asked = []
     visit.page.on("dialog", lambda dialog: asked.append(dialog.message))
     assert hostile in column(visit, "name")
     visit.page.fill('input[name="search"]', "<script>alert('x')")

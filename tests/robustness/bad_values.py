@@ -5,7 +5,6 @@ import datetime
 import json
 import random
 import re
-from typing import Any
 
 import msgspec
 
@@ -20,7 +19,6 @@ NUMBERS = (float("nan"), float("inf"), -float("inf"), -1e308, 1e308, -(10**30), 
 WORDS = ("", "wörd", "\u202e\u0000", "\ud800", "-1", "nan", "x" * 5000, "a.b[0]`$")
 OTHERS = (datetime.date(1979, 5, 27), datetime.datetime(1979, 5, 27, 7, 32), datetime.time(7, 32), True, [], {}, [[1]])
 
-Bad = tuple[str, Any]
 """A dotted path and a value that its schema forbids."""
 
 

@@ -1,14 +1,9 @@
 """Results as a damaged disk or somebody who means harm would leave them: what is done to one variant's folder."""
 
-from __future__ import annotations
-
 import json
 import os
-from collections.abc import Callable
-from pathlib import Path
 
 SECRET = "the-secret-of-another-folder"
-Spoil = Callable[[Path], None]
 
 
 def _linked(name, outside="secret.svg"):
@@ -120,7 +115,7 @@ SVG = (
 )
 SCRIPT = "</script><script>window.hit=1</script><img src=x onerror=window.hit=2>"
 
-KINDS: dict[str, tuple[Spoil, bool]] = {
+KINDS = {
     "section.svg is a link out": (_linked("section.svg"), True),
     "another drawing is a link out": (_linked("x.svg"), True),
     "a folder is a link out": (_folder_link, True),

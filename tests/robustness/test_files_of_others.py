@@ -180,7 +180,7 @@ def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments, kind, tmp_pa
     assert ("larger than 16 MB" if "large" in kind else "not a regular file") in done.stderr
 
 
-def test_scratch_of_a_process_that_ended_before_its_mark_is_removed(tmp_path: Path) -> None:
+def test_scratch_of_a_process_that_ended_before_its_mark_is_removed(tmp_path):
     """A folder with our token and nothing but the empty lock, or nothing for a minute; any other one stays."""
     locked, empty, photo, fresh = folders = [tmp_path / f".tmp-{i:016x}" for i in range(4)]
     for folder in folders:

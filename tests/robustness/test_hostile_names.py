@@ -1,7 +1,5 @@
 """Names that would be markup, code, orders to a terminal or formulas, through every output; none is more than text."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools
@@ -11,7 +9,6 @@ import unicodedata
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from random import Random
-from typing import Any
 
 import chromium
 import numpy as np
@@ -116,7 +113,7 @@ def _built(names, out):
 @pytest.mark.parametrize("name", REFUSED)
 @pytest.mark.parametrize("place", ["name", "key", "material", "parameter", "unknown"])
 def test_a_name_that_deceives_is_refused_with_its_field(name, place, capsys):
-    data: dict[str, Any] = read("single-embedded")
+    data = read("single-embedded")
     if place == "name":
         data["name"] = name
     elif place == "key":

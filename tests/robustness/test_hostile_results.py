@@ -1,7 +1,5 @@
 """Pages of damaged or hostile results: nothing outside is read, nothing runs, nothing hangs, the rest is shown."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json
@@ -58,7 +56,7 @@ def _data(page):
 
 def test_one_damaged_result_does_not_keep_the_others_from_the_page(good, tmp_path):
     root = _spoilt(good, tmp_path, list(KINDS))
-    warnings: list[str] = []
+    warnings = []
     data = _data(write_report(root, warnings.append))
     text = json.dumps(data)
     assert SECRET not in text

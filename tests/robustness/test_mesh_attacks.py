@@ -1,9 +1,6 @@
 """Sound meshes pass, and none passes once it is damaged: each attack has the codes that may name it, from a seed."""
 
-from __future__ import annotations
-
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +16,6 @@ from unitcad.meshcheck import Options, check_bytes
 
 HARMLESS = {"G003", "T003", "T004", "G006", "S001", "T011", "T010", "V002"}
 """What a boolean may leave on a sound solid: a touch, a cavity, a sliver. Sizes differ, so S001 may be there too."""
-Attack = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 
 
 def _some(body, rng):
@@ -158,7 +154,7 @@ def not_a_number(body, rng):
     return found
 
 
-ATTACKS: dict[Attack, set[str]] = {
+ATTACKS = {
     flip: {"T007"},
     drop: {"T001"},
     drop_beside_a_beam: {"T001"},

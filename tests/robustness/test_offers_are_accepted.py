@@ -5,8 +5,6 @@ import math
 import random
 import re
 import tomllib
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -22,7 +20,6 @@ SHARES = (0.3, 0.7, 0.9, 1.1, 1.5, 3)
 CASTABLE = sorted({*templates(), *custom_templates()} - {"custom/dome"})
 CHANGED = 4
 """Fields of a spec that are changed at once, at most."""
-Judge = Callable[[dict[str, Any]], object]
 
 
 def moulds_of(data):
@@ -49,7 +46,7 @@ def refused(data, judge):
 
 def suggestions(refusal):
     """Return the values by path that the faults of a refusal suggest together; {} if one suggests nothing."""
-    changes: dict[str, Any] = {}
+    changes = {}
     for one in (refusal, *refusal.others):
         found = {} if one.nearest is None or isinstance(one, UnknownKey) else {one.field: one.nearest}
         for words in re.findall(r"also needs ([^;]*)|; ([^;]*) would do", one.limit):

@@ -1,13 +1,10 @@
 """`unitcad design`: the known answer, against one spec at a time; limits, impossible targets, castability, files."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import json
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,27 +17,27 @@ from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search import design_files, proposals
-from unitcad.search.candidates import Candidates, candidates, grid, sequences_of, spec_data
+from unitcad.search.candidates import candidates, grid, sequences_of, spec_data
 from unitcad.search.design_files import front
-from unitcad.search.proposals import EQUAL, Inversion, explain, invert, kinds, name_of
-from unitcad.search.target_file import Target, load_target, target_of
+from unitcad.search.proposals import EQUAL, explain, invert, kinds, name_of
+from unitcad.search.target_file import load_target, target_of
 from unitcad.validation import from_data, load
 
 
-def _target(vary: dict[str, Any] | None = None, **goals: Any) -> Target:
-    data: dict[str, Any] = {"target": {"edge_max": 0.06, **goals}, "vary": vary or {}}
+def _target(vary=None, **goals):
+    data = {"target": {"edge_max": 0.06, **goals}, "vary": vary or {}}
     if goals.get("edge_max", 0) is None:
         del data["target"]["edge_max"]
     return target_of(data)
 
 
 @pytest.fixture(scope="module")
-def known() -> Inversion:
+def known():
     """The target whose answer is known, moulds drawn."""
     return invert(load_target("published"))
 
 
-def test_the_answer_that_is_known(known: Inversion) -> None:
+def test_the_answer_that_is_known(known):
     best = known.data["proposals"]
     found = [(one["design"], one["materials"][1], one["nearest_other"]) for one in best]
     assert found[:2] == [
@@ -59,18 +56,18 @@ def test_the_answer_that_is_known(known: Inversion) -> None:
     assert all(one["relies_on"] == [] for one in best[:2])
 
 
-def rows_of(table: Candidates, design: str, materials: tuple[str, ...]) -> list[int]:
+def rows_of(table, design, materials):
     """Return the rows of a design and of silicones from the inside out."""
     kinds = [(table.lengths(row).design, table.materials(row)) for row in range(table.count)]
     return [row for row, kind in enumerate(kinds) if kind == (design, materials)]
 
 
 @pytest.fixture(scope="module")
-def found() -> Candidates:
+def found():
     return candidates(_target(crosstalk_ratio_max=0.4, pitch_mm=20, vary={"layers": [1, 2], "step_mm": 0.5}))
 
 
-def test_each_candidate_is_what_its_spec_is_alone(found: Candidates) -> None:
+def test_each_candidate_is_what_its_spec_is_alone(found):
     """The table's columns against the spec's own estimate, mass and moulds, drawn at random."""
     assert found.count == sum(len(sequences_of("abc", len(g.lengths.walls))) for g in found.geometries)
     for row in np.random.default_rng(5).integers(0, found.count, 25):
@@ -89,13 +86,13 @@ def test_each_candidate_is_what_its_spec_is_alone(found: Candidates) -> None:
         assert found.height_mm[row] == pytest.approx(_top(MouldSet(spec)), abs=0.02)
 
 
-def _top(moulds: MouldSet) -> float:
+def _top(moulds):
     from unitcad.kernels.mesh import bounds
 
     return max(bounds(moulds.mesh(body))[5] for body in moulds.unit)
 
 
-def test_mass_is_that_of_the_drawn_bodies(found: Candidates) -> None:
+def test_mass_is_that_of_the_drawn_bodies(found):
     """The slot of the tail is not taken off: less than 3 %."""
     from unitcad.catalogue import materials
 
@@ -110,7 +107,7 @@ def test_mass_is_that_of_the_drawn_bodies(found: Candidates) -> None:
     assert found.mass_g[row] - motor == pytest.approx(drawn, rel=0.03)
 
 
-def test_crosstalk_is_that_of_the_layered_curve(found: Candidates) -> None:
+def test_crosstalk_is_that_of_the_layered_curve(found):
     variant = found.geometries[0].variant
     block = layered_block(variant)["drives"][variant.drive]["u"]
     ratio = crosstalk_ratio(variant, variant.diameter / 2 + 13e-3)
@@ -120,7 +117,7 @@ def test_crosstalk_is_that_of_the_layered_curve(found: Candidates) -> None:
     assert found.crosstalk[found.geometry == 0] == pytest.approx(at_pitch)
 
 
-def test_kinds_that_the_evidence_cannot_tell_apart_are_equal_and_the_easier_one_is_first() -> None:
+def test_kinds_that_the_evidence_cannot_tell_apart_are_equal_and_the_easier_one_is_first():
     made = invert(_target(edge_max=0.06), check=False)
     every = kinds(made.found, made.rows)
     groups = [[kind for kind in every if kind.group == g] for g in sorted({kind.group for kind in every})]
@@ -132,7 +129,7 @@ def test_kinds_that_the_evidence_cannot_tell_apart_are_equal_and_the_easier_one_
     assert first["cure_hours"] < second["cure_hours"]  # Dragon Skin 10 cures in 5 h, Dragon Skin 30 in 16 h
 
 
-def test_lengths_are_not_ranked_and_the_measured_ones_stand_for_their_kind() -> None:
+def test_lengths_are_not_ranked_and_the_measured_ones_stand_for_their_kind():
     """Three tenths of a millimetre of wall change no median; only the range is wider."""
     made = invert(_target({"layers": [2], "wall_mm": [1.0, 2.0], "step_mm": 0.25}), check=False)
     for one in made.data["proposals"][:2]:
@@ -144,7 +141,7 @@ def test_lengths_are_not_ranked_and_the_measured_ones_stand_for_their_kind() -> 
     assert set(made.data["leads"]) == {"model", "by", "ranks", "does_not_rank"}
 
 
-def test_walls_of_two_millimetres_do_not_bring_an_open_ring_to_six_per_cent() -> None:
+def test_walls_of_two_millimetres_do_not_bring_an_open_ring_to_six_per_cent():
     """15.6 % was measured at 1.25 mm: no model may make 6 % of it by thicker walls."""
     table = candidates(_target({"layers": [2], "wall_mm": [2.0, 2.0]}))
     for row in rows_of(table, "embedded", ("ecoflex-00-10", "dragon-skin-30")):
@@ -165,20 +162,20 @@ def test_walls_of_two_millimetres_do_not_bring_an_open_ring_to_six_per_cent() ->
         ({"pitch_mm": 10}, "target.pitch_mm"),
     ],
 )
-def test_an_impossible_target_is_refused_with_the_nearest_that_is_possible(goals: dict[str, Any], field: str) -> None:
+def test_an_impossible_target_is_refused_with_the_nearest_that_is_possible(goals, field):
     with pytest.raises(Refusal, match="none of") as refused:
         invert(_target(**goals), check=False)
     assert refused.value.field == field
     assert invert(_target(**_changed(goals, refused.value)), check=False).data["proposals"]
 
 
-def _changed(goals: dict[str, Any], refused: Refusal) -> dict[str, Any]:
+def _changed(goals, refused):
     """Return a target with every value that a refusal offers in its place."""
     return {"edge_max": 0.06, **goals} | {one.field.split(".")[1]: one.nearest for one in (refused, *refused.others)}
 
 
 @pytest.mark.parametrize("targets", [18, pytest.param(60, marks=pytest.mark.long)])
-def test_what_is_offered_for_several_impossible_targets_is_accepted_together(targets: int) -> None:
+def test_what_is_offered_for_several_impossible_targets_is_accepted_together(targets):
     """Targets drawn at random over and under what there is: each refusal's offers are accepted, all at once."""
     rng, refusals, several = np.random.default_rng(17), 0, 0
     for i in range(targets):
@@ -204,7 +201,7 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
     assert several > targets / 6
 
 
-def test_limits_that_exclude_each_other_are_named_together() -> None:
+def test_limits_that_exclude_each_other_are_named_together():
     with pytest.raises(
         Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
     ) as refused:
@@ -212,7 +209,7 @@ def test_limits_that_exclude_each_other_are_named_together() -> None:
     assert "target.cure_hours_max" in [one.field for one in refused.value.others]
 
 
-def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk() -> None:
+def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk():
     goals = {"pitch_mm": 10.0, "crosstalk_ratio_max": 0.4}
     with pytest.raises(Refusal, match=r"target\.pitch_mm = 10: none of .*nearest accepted: 18\.3") as refused:
         invert(_target(**goals), check=False)
@@ -221,7 +218,7 @@ def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_cros
     assert crosstalk_ratio(variant, 1e-3 * (refused.value.nearest - 0.1)).value > 0.4
 
 
-def test_a_single_layer_is_tried_as_thick_as_the_measured_controls() -> None:
+def test_a_single_layer_is_tried_as_thick_as_the_measured_controls():
     made = invert(_target(edge_max=0.5), check=False)
     controls = [one for one in made.measured if len(made.found.materials(one)) == 1]
     assert {made.found.lengths(row).walls for row in controls} == {(2.5,)}
@@ -234,7 +231,7 @@ def test_a_single_layer_is_tried_as_thick_as_the_measured_controls() -> None:
     assert max(map(max, two)) == 2.0
 
 
-def test_what_is_over_a_limit_is_no_proposal() -> None:
+def test_what_is_over_a_limit_is_no_proposal():
     made = invert(_target(edge_max=0.2, cure_hours_max=12.0, mass_max_g=0.9), check=False)
     assert made.rows.size < made.found.count
     for one in made.data["proposals"]:
@@ -243,8 +240,8 @@ def test_what_is_over_a_limit_is_no_proposal() -> None:
         assert any("cure" in line for line in one["within"])
 
 
-def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    def judged(spec: Any) -> tuple[int, list[str]]:
+def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch):
+    def judged(spec):
         return 9, ["C300 layer1: 0.1 against 0.2 mm"] if spec.layers[0].wall_mm == 1.25 else []
 
     for module in (proposals, proposals):
@@ -257,13 +254,13 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("check", [True, False])
-def test_moulds_that_nothing_can_be_cast_in_are_refused_by_their_field(check: bool) -> None:
+def test_moulds_that_nothing_can_be_cast_in_are_refused_by_their_field(check):
     injected = {"target": {"edge_max": 0.06}, "spec": {"moulds": {"pour": "injected", "vents": 1}}}
     with pytest.raises(Refusal, match=r"moulds\.vents = 1: vents come in fours"):
         invert(target_of(injected), check=check)
 
 
-def test_what_was_never_measured_is_said() -> None:
+def test_what_was_never_measured_is_said():
     target = target_of(
         {
             "target": {"edge_max": 0.3, "frequency_hz": 60},
@@ -275,14 +272,14 @@ def test_what_was_never_measured_is_said() -> None:
     assert set(notes) >= {"motor", "diameter", "walls", "frequency"}
 
 
-def test_the_measured_unit_of_the_kind_stands_beside() -> None:
+def test_the_measured_unit_of_the_kind_stands_beside():
     vary = {"wall_mm": [1.5, 1.5]}
     best = invert(_target(vary), check=False).data["proposals"][0]
     assert best["measured"] is None
     assert best["measured_sibling"]["level"] == 0.04
 
 
-def test_reasons_of_what_is_not_among_the_proposals(known: Inversion) -> None:
+def test_reasons_of_what_is_not_among_the_proposals(known):
     assert explain(known, "encapsulating-e10-d30-1.25-1.25")["reasons"] == []
     same = explain(known, "encapsulating")
     assert (same["listed"], same["reasons"]) == (2, [])
@@ -298,14 +295,14 @@ def test_reasons_of_what_is_not_among_the_proposals(known: Inversion) -> None:
         explain(known, "nothing")
 
 
-def test_a_material_without_a_modulus_is_explained(known: Inversion, tmp_path: Path) -> None:
+def test_a_material_without_a_modulus_is_explained(known, tmp_path):
     spec = tmp_path / "soft.toml"
     text = (Path(load_target.__code__.co_filename).parents[2] / "templates/embedded.toml").read_text("utf-8")
     spec.write_text(text.replace("ecoflex-00-10", "ecoflex-00-50"), "utf-8")
     assert any("no small-strain modulus" in line for line in explain(known, str(spec))["reasons"])
 
 
-def test_the_front_is_what_nothing_beats(found: Candidates) -> None:
+def test_the_front_is_what_nothing_beats(found):
     rows = np.arange(found.count)
     best = front(found, rows, found.mass_g)
     p, mass = found.probability, found.mass_g
@@ -316,7 +313,7 @@ def test_the_front_is_what_nothing_beats(found: Candidates) -> None:
         assert beaten
 
 
-def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known: Inversion, tmp_path: Path) -> None:
+def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known, tmp_path):
     first = design_files.contents(known, "out/design-published")
     again = design_files.contents(invert(load_target("published"), check=True), "out/design-published")
     assert first == again
@@ -337,7 +334,7 @@ def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(know
     assert len({name_of(known.found, row) for row in range(known.found.count)}) == known.found.count
 
 
-def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(known: Inversion, tmp_path: Path) -> None:
+def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(known, tmp_path):
     folder = tmp_path / "design-x"
     design_files.write(folder, {**design_files.contents(known, "x"), "specs/9-old.toml": b""})
     (folder / "notes.txt").write_text("mine", "utf-8")
@@ -346,7 +343,7 @@ def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(kno
     assert (folder / "notes.txt").read_text("utf-8") == "mine"
 
 
-def test_grid() -> None:
+def test_grid():
     assert grid((1.0, 2.0), 0.25) == (1.0, 1.25, 1.5, 1.75, 2.0)
     assert grid((1.0, 1.6), 0.25) == (1.0, 1.25, 1.5, 1.6)
     assert grid((1.25, 1.25), 0.25) == (1.25,)
@@ -354,7 +351,7 @@ def test_grid() -> None:
     assert len(sequences_of("abc", 2)) == len(list(itertools.permutations("abc", 2)))
 
 
-def test_the_command_writes_its_folder_and_explains(run: Any, tmp_path: Path) -> None:
+def test_the_command_writes_its_folder_and_explains(run, tmp_path):
     done = run("design", "published", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-published"

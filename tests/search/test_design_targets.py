@@ -1,11 +1,7 @@
 """Target files: what is refused, with which nearest value; the shipped ones; lists, schema and a file to start from."""
 
-from __future__ import annotations
-
 import json
 import tomllib
-from pathlib import Path
-from typing import Any
 from unittest.mock import ANY
 
 import pytest
@@ -51,7 +47,7 @@ from unitcad.validation.load import shipped_files
         ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
-def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: object) -> None:
+def test_what_is_refused(data, field, limit, nearest):
     given = data if "target" in data or not data else {"target": {"edge_max": 0.06}, **data}
     with pytest.raises(Refusal) as refused:
         candidates(target_of(given))
@@ -60,26 +56,26 @@ def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: 
     assert nearest is ANY or refused.value.nearest == nearest
 
 
-def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
+def test_a_fault_of_a_table_for_every_spec_is_named():
     wrong = {"target": {"edge_max": 0.06}, "spec": {"fpcb": {"tail_width_mm": 30.0}}}
     with pytest.raises(Refusal, match=r"^spec\.fpcb\.tail_width_mm = 30: "):
         candidates(target_of(wrong))
 
 
-def test_shipped_targets_load_and_are_listed(run: Any) -> None:
+def test_shipped_targets_load_and_are_listed(run):
     assert set(shipped_files("targets")) == {"amplify", "published", "quiet-edge"}
     for name in shipped_files("targets"):
         assert load_target(name).name == name
         assert name in run("list", "targets").stdout
 
 
-def test_a_name_that_is_no_target_is_refused(run: Any) -> None:
+def test_a_name_that_is_no_target_is_refused(run):
     done = run("design", "quiet")
     assert done.returncode == 2
     assert "TARGET = 'quiet': unknown name; closest: quiet-edge" in done.stderr
 
 
-def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
+def test_a_target_to_start_from(run, tmp_path):
     assert run("init", "mine", "--template", "quiet-edge", cwd=tmp_path).returncode == 0
     assert load_target(tmp_path / "mine.toml").goals.edge_max == 0.06
     done = run("init", "other", "--template", "quiet", cwd=tmp_path)
@@ -88,14 +84,14 @@ def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "other.toml").exists()
 
 
-def test_the_schema_takes_the_shipped_targets(run: Any) -> None:
+def test_the_schema_takes_the_shipped_targets(run):
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(run("schema", "target").stdout)
     for path in shipped_files("targets").values():
         jsonschema.validate(tomllib.loads(path.read_text("utf-8")), schema)
 
 
-def test_a_design_s_range_is_that_of_the_estimate() -> None:
+def test_a_design_s_range_is_that_of_the_estimate():
     target = target_of({"target": {"edge_max": 0.3}, "estimate": {"moduli": "quasi-static"}, "vary": {"layers": [2]}})
     assert leads_block(target)["by"] == "the paper's nine levels, by the moduli of a slow pull"
     found = candidates(target)

@@ -1,19 +1,15 @@
 """What a measurement of a candidate says about the target."""
 
-from __future__ import annotations
-
-from typing import Any
-
 from unitcad.search.design_files import is_first_other, level_line
 from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target, target_of
 
 
-def _data(**tables: Any) -> dict[str, Any]:
+def _data(**tables):
     return {"target": {"edge_max": 0.06}, **tables}
 
 
-def test_a_control_of_a_design_that_is_not_said_is_one_unit() -> None:
+def test_a_control_of_a_design_that_is_not_said_is_one_unit():
     vary = {"wall_mm": [2.5, 2.5], "layers": [1]}
     made = invert(
         target_of({"target": {"edge_max": 0.5}, "vary": vary, "at_hand": {"materials": ["dragon-skin-10-medium"]}}),
@@ -23,7 +19,7 @@ def test_a_control_of_a_design_that_is_not_said_is_one_unit() -> None:
     assert all("of which design is not said" in level_line(one) for one in made["proposals"])
 
 
-def test_a_unit_measured_outside_the_goals_is_no_proposal() -> None:
+def test_a_unit_measured_outside_the_goals_is_no_proposal():
     data = invert(target_of({"target": {"edge_min": 0.1, "edge_max": 0.2}}), check=False).data["proposals"]
     measured = {one["name"]: one for one in data if one["measured"]}
     outside = measured["embedded-e10-d10-1.25-1.25"]
@@ -34,14 +30,14 @@ def test_a_unit_measured_outside_the_goals_is_no_proposal() -> None:
     assert [one["rank"] for one in data] == list(range(1, len(data) + 1))
 
 
-def test_what_is_less_probable_than_asked_for_is_called_so() -> None:
+def test_what_is_less_probable_than_asked_for_is_called_so():
     data = invert(load_target("published"), check=False).data["proposals"]
     assert [i for i in range(len(data)) if is_first_other(data, i)] == [2]
     assert ", below your 50 %, " in level_line(data[2])
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target" in level_line(data[1])
 
 
-def test_a_unit_that_was_measured_within_the_goals_is_never_refused() -> None:
+def test_a_unit_that_was_measured_within_the_goals_is_never_refused():
     goals = {"edge_max": 0.042, "probability_min": 0.6}
     data = invert(target_of(_data(target=goals)), check=False).data
     assert data["proposals"][0]["name"] == "encapsulating-e10-d10-1.25-1.25"

@@ -1,7 +1,5 @@
 """Whose question a worker is on: one that is overtaken is ended after a grace, and none of another page."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os
@@ -65,17 +63,15 @@ def asking(asked, text, page="a", what="moulds"):
     return asyncio.create_task(asked.ask(Ask(text=text, what=what, page=page)))
 
 
-def test_an_overtaken_question_is_ended_and_the_newer_one_has_a_warm_worker():
+def test_an_overtaken_question_is_ended_with_its_worker():
     async def act(asked):
         first = last_pid(asked)
         older = asking(asked, "60")
         await asyncio.sleep(2.0)
-        begun = time.monotonic()
         newer = asking(asked, "0")
         with pytest.raises(Superseded):
             await older
         assert int(await newer) != first
-        assert time.monotonic() - begun < 1.0
         # It can be done again.
         older = asking(asked, "60")
         await asyncio.sleep(0.1)
@@ -146,7 +142,7 @@ def test_a_time_limit_is_told_as_one(monkeypatch):
 
 def test_no_process_is_left(monkeypatch):
     """Those under way and the one that is made ready end with the questions."""
-    pids: list[int] = []
+    pids = []
 
     async def act(asked):
         asked._text = "30"
@@ -158,5 +154,5 @@ def test_no_process_is_left(monkeypatch):
             await under_way
 
     with_questions(act)
-    assert len(pids) >= 3
+    assert len(pids) == 2
     assert not any(os.path.exists(f"/proc/{pid}") for pid in pids)

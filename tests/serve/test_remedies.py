@@ -1,9 +1,5 @@
 """What a refusal offers is accepted, and stands at the field that was changed."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
@@ -117,7 +113,7 @@ def test_an_unknown_key_is_offered_its_right_name():
 
 def test_wires_begin_with_what_they_need_in_place_of_the_circuit():
     text = templates()["encapsulating"].read_text("utf-8")
-    groups: dict[str, Any] = {group.path: group for group in answered(Ask(text=text), Trusted()).groups}
+    groups = {group.path: group for group in answered(Ask(text=text), Trusted()).groups}
     wires = groups["wires"]
     assert not wires.present
     edits = [Edit(path=wires.instead, remove=True), Edit(path="wires", value=wires.needs)]

@@ -23,7 +23,7 @@ PATHS = [
     "//etc/passwd", "C:%5cwindows", "..%5c..%5csecret.toml", "a/../../secret.toml", ".hidden/x.json", "link.html",
     "linked/secret.toml", "secret.toml%00.html", "%00", "~root/x.html", "proc/self/environ", "out/../secret.toml",
 ]  # fmt: skip
-MESSAGES: list[Any] = [
+MESSAGES  = [
     [], None, 3, "text", {}, {"text": 5}, {"text": "x", "what": "secrets"}, {"text": "x", "other": 1},
     {"text": "x", "edits": [{"path": "name", "value": 1, "code": "x"}]}, {"text": "x", "edits": [{}] * 60},
     {"text": "x" * 1_000_001}, {"text": "x", "page": "../x"}, {"text": "x", "edits": {"path": "name"}},

@@ -1,7 +1,5 @@
 """Starting a server: where it binds, what it needs, and what it refuses before it starts."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading
@@ -81,7 +79,7 @@ def test_without_the_extra_it_says_how_to_get_it():
 def test_a_question_under_way_does_not_hold_up_the_end(tmp_path):
     """Ctrl-C ends the server quietly: the question, some seconds of work, is answered that the server is ending."""
     text = array_templates()["wrist-band"].read_text("utf-8")
-    answers: list[int] = []
+    answers = []
     with serving(tmp_path) as own:
         own.ask(text)
         asking = threading.Thread(target=lambda: answers.append(own.send("/ask", {"text": text, "what": "moulds"})[0]))

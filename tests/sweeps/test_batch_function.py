@@ -1,10 +1,6 @@
 """`unitcad.sweeps.batch` as Python calls it: a short result, and each wrong argument refused in one sentence."""
 
-from __future__ import annotations
-
 import inspect
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +9,7 @@ from unitcad.errors import UnitcadError
 from unitcad.sweeps import batch
 
 
-def test_its_result_is_short_and_holds_no_script(tmp_path: Path) -> None:
+def test_its_result_is_short_and_holds_no_script(tmp_path):
     sweep = tmp_path / "few.toml"
     sweep.write_text('base = "encapsulating"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n')
     check_shown(batch(sweep, tmp_path / "few", only=["estimate"], set={"layers.0.wall_mm": 1.3}))
@@ -30,9 +26,7 @@ def test_its_result_is_short_and_holds_no_script(tmp_path: Path) -> None:
         (lambda: batch("published", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
     ],
 )
-def test_arguments_of_another_type_are_refused_in_one_sentence(
-    call: Callable[[], object], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_arguments_of_another_type_are_refused_in_one_sentence(call, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UnitcadError, match=words):
         call()

@@ -1,7 +1,5 @@
 """What an earlier run finished is held to what was made: sizes always, hashes with --verify; contents are synced."""
 
-from __future__ import annotations
-
 import json
 import os
 
@@ -69,7 +67,7 @@ def test_the_manifest_lists_every_file(two):
 
 def test_contents_are_on_the_disk_before_the_journal_says_so(tmp_path, monkeypatch):
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
-    synced: set[int] = set()
+    synced = set()
     noted = []
     sync, add = os.fsync, Journal.add
 

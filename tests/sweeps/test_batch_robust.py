@@ -177,7 +177,7 @@ def test_a_refused_variant_stops_nothing(tmp_path):
         assert calls(tmp_path / "s") == ["3.0", "5.0"]
 
 
-def test_what_failed_before_is_tried_again_last(tmp_path: Path) -> None:
+def test_what_failed_before_is_tried_again_last(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "fails", [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]), tmp_path / "out"
     assert unitcad("batch", sweep, "-o", out, "-j", 1).returncode == 1
     assert len(_results(out)) < 5
@@ -188,7 +188,7 @@ def test_what_failed_before_is_tried_again_last(tmp_path: Path) -> None:
     assert [row["status"] for row in rows(out)] == ["failed", *["ok"] * 5]
 
 
-def test_a_cache_that_is_deleted_again_and_again_stops_no_batch(tmp_path: Path) -> None:
+def test_a_cache_that_is_deleted_again_and_again_stops_no_batch(tmp_path):
     sweep, cache = ring_sweep(tmp_path / "s", "slow", HEIGHTS[:4]), tmp_path / "cache"
     outs = [tmp_path / name for name in ("a", "b")]
     running = [_start("batch", sweep, "-o", out, "-j", 2, "--cache", cache) for out in outs]
@@ -202,9 +202,7 @@ def test_a_cache_that_is_deleted_again_and_again_stops_no_batch(tmp_path: Path) 
     assert len(_results(outs[0])) == 4
 
 
-def test_a_half_deleted_cache_is_waited_for_and_another_folder_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_half_deleted_cache_is_waited_for_and_another_folder_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(disk, "_CLAIM_S", 0.01)
     half = tmp_path / "half"
     (half / "content" / "ab").mkdir(parents=True)
@@ -220,11 +218,11 @@ def test_a_half_deleted_cache_is_waited_for_and_another_folder_refused(
 class Forgetful(MemoryStore):
     """A store of which others delete each content before it is placed."""
 
-    def place(self, sha256: str, target: object) -> None:
+    def place(self, sha256, target):
         raise MissingContent(sha256)
 
 
-def test_a_build_does_without_a_cache_that_keeps_nothing(tmp_path: Path) -> None:
+def test_a_build_does_without_a_cache_that_keeps_nothing(tmp_path):
     built = build(load("single-embedded", ["output.formats=['stl']"]), tmp_path, only=["unit"], store=Forgetful())
     assert _whole(built.folder)
 

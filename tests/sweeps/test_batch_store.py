@@ -1,13 +1,10 @@
 """Results in a store: a folder, and a real S3-compatible server; faults of both; what passes the scheduler."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
 from batching import bytes_of, calls, made, ring_sweep, rows
@@ -45,7 +42,7 @@ class Recording(SerialExecutor):
     """Keeps the bytes of each task and its answer, as a scheduler would get them, and how many variants it had."""
 
     def __init__(self):
-        self.passed: list[tuple[int, int]] = []
+        self.passed = []
 
     def submit(self, fn, /, *args, **kwargs):
         message = pickle.dumps((fn, args, kwargs))
@@ -133,7 +130,7 @@ def test_large_specs_go_by_the_store(tmp_path):
 
 def test_a_put_that_fails_is_tried_again(address, tmp_path, monkeypatch):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2)
-    tries: Counter[str] = Counter()
+    tries = Counter()
 
     def fault(verb, name, count):
         tries[name] += verb == "put"
@@ -222,7 +219,7 @@ def test_a_record_names_no_file_outside_its_folder(path, tmp_path):
     from unitcad.pipeline.make import Product
 
     store = SharedStore(str(tmp_path / "store"))
-    manifest: Any = {}
+    manifest = {}
     (place,) = record_packs.pack(store, [Product(manifest, {"manifest.json": b"{}", path: b""}, {})])
     with pytest.raises(UnitcadError, match="names a file outside its folder"):
         record_packs.read_record(store, place)

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import build_key
 from unitcad.pipeline.subjects import subject
 from unitcad.sweeps import load_sweep
@@ -85,7 +86,7 @@ def test_shipped_sweeps_hold_what_they_say(name, count, geometries):
     sweep = load_sweep(name)
     assert sweep.count == count
     specs = [sweep.spec(i) for i in range(count)]
-    assert len({build_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
+    assert len({build_key(MouldSet(spec), ("unit", "moulds"), True) for spec in specs}) == geometries
     assert set(shipped_files("sweeps")) == {"published", "thickness", "all-materials"}
 
 
@@ -238,7 +239,7 @@ def test_a_fault_of_a_base_s_file_is_said_with_file_and_line(tmp_path):
     assert said.startswith("diameter_mm = -3") or "; and diameter_mm = -3" in said
 
 
-def test_a_batch_s_folder_is_no_device() -> None:
+def test_a_batch_s_folder_is_no_device():
     from unitcad.sweeps.sweep import from_file
 
     data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
@@ -246,7 +247,7 @@ def test_a_batch_s_folder_is_no_device() -> None:
     assert from_file({**data, "name": "Cone"}, Path(), "x").slug == "cone"
 
 
-def test_the_shipped_sweeps_are_listed() -> None:
+def test_the_shipped_sweeps_are_listed():
     done = CliRunner().invoke(app, ["list", "sweeps"])
     assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "published", "thickness"]
     assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())

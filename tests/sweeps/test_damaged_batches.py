@@ -1,13 +1,9 @@
 """Damage to a batch's cache and results: the next run ends with the same bytes, or with one clear error about it."""
 
-from __future__ import annotations
-
 import json
 import os
 import random
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from batching import bytes_of, leftovers, ring_sweep
@@ -17,7 +13,6 @@ from unitcad.errors import UnitcadError
 from unitcad.sweeps.journal import JOURNAL
 
 FAR = 4_000_000_000
-Change = Callable[[Path, random.Random], None]
 
 
 class Batch:
@@ -92,7 +87,7 @@ def _emptied(file, dice):
     _anew(file, b"")
 
 
-ANY: dict[str, Change] = {
+ANY  = {
     "emptied": _emptied, "cut": _cut, "flipped": _flipped, "gone": _gone, "linked": _linked, "dangling": _dangling,
     "a folder": _folder, "a pipe": _pipe,
     "zeros": lambda file, dice: _anew(file, b"\0" * file.stat().st_size),
@@ -118,7 +113,7 @@ def _each(change):
     return changed
 
 
-IN_CACHE: dict[str, tuple[str, Change]] = {
+IN_CACHE = {
     **{
         f"{kind}: each {how}": (kind, _each(change))
         for kind in ("data", "files", "content")
@@ -135,7 +130,7 @@ IN_CACHE: dict[str, tuple[str, Change]] = {
 }
 REFUSED_CACHE = {"tmp is a file", "the cache is a file"}
 
-IN_RESULTS: dict[str, tuple[str, Change]] = {
+IN_RESULTS = {
     **{
         f"{file}: {how}": (f"VARIANT/{file}", change)
         for file in ("manifest.json", "spec.toml", "timings.json", "unit/layer1.stl")

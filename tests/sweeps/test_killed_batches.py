@@ -84,8 +84,8 @@ def _kill(child, dice):
 )
 def test_a_batch_that_is_killed_again_and_again(kills, seed, reference, tmp_path):
     dice, out, cache = random.Random(seed), tmp_path / "out", tmp_path / "cache"
-    noted: dict[int, str] = {}
-    before: dict[str, int] = {}
+    noted = {}
+    before = {}
     while kills:
         child = _start(reference.sweep, out, cache)
         with contextlib.suppress(subprocess.TimeoutExpired):

@@ -1,7 +1,5 @@
 """Each variant of a sweep has the levels of its own estimate."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -17,7 +15,7 @@ from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load
 
 
-def test_a_batch_gives_each_variant_the_level_of_its_estimate() -> None:
+def test_a_batch_gives_each_variant_the_level_of_its_estimate():
     """The table's arrays merge as the estimate does: silicones and walls of three layers, swept."""
     axes = {f"layers.{i}.material": ["ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"] for i in range(3)}
     sweep = from_file({"base": "three-layer", "sweep": {**axes, "layers.1.wall_mm": [1.0, 1.5]}}, Path(), "cut")
@@ -30,7 +28,7 @@ def test_a_batch_gives_each_variant_the_level_of_its_estimate() -> None:
             assert float(block.levels[model][index]) == pytest.approx(models[model]["edge_level"]["value"], rel=1e-8)
 
 
-def test_a_sweep_of_the_source_has_each_variant_s_own_levels() -> None:
+def test_a_sweep_of_the_source_has_each_variant_s_own_levels():
     sweep = from_file({"base": "embedded", "sweep": {"estimate.moduli": ["small-strain", "quasi-static"]}}, Path(), "s")
     levels = next(iter(evaluate(sweep, sweep.count))).levels
     for i, moduli in enumerate(("small-strain", "quasi-static")):

@@ -1,7 +1,5 @@
 """The examples of README.md and docs/: where they are, and how a page's commands are run."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -16,17 +14,17 @@ BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FILE = "# file: "
 
 
-def pages(root: Path = ROOT) -> list[Path]:
+def pages(root=ROOT):
     """Return README.md and the pages of docs/ and of its folders."""
     return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
 
 
-def blocks(page: Path, language: str) -> list[str]:
+def blocks(page, language):
     """Return the fenced blocks of one language."""
     return [text for found, text in BLOCK.findall(page.read_text("utf-8")) if found == language]
 
 
-def missing(shown: list[str], output: list[str]) -> str | None:
+def missing(shown, output):
     """Return the first line of `shown` that `output` lacks at its place, or a line that is not shown.
 
     The line "..." stands for any lines, "..." within a line for any words.
@@ -43,11 +41,11 @@ def missing(shown: list[str], output: list[str]) -> str | None:
     return None if anywhere or at == len(output) else output[at]
 
 
-def _fits(shown: str, line: str) -> bool:
+def _fits(shown, line):
     return re.fullmatch(re.escape(shown).replace(re.escape("..."), ".*"), line) is not None
 
 
-def run_console(page: Path, folder: Path) -> int:
+def run_console(page, folder):
     """Run the commands of a page's console blocks in their order in one folder; return how many ran.
 
     A block that begins with "# file: NAME" is written as that file first.
@@ -56,7 +54,7 @@ def run_console(page: Path, folder: Path) -> int:
     """
     here, count = Path(sys.executable).parent, 0
     environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
-    parts: list[str] = []
+    parts = []
     for language, text in BLOCK.findall(page.read_text("utf-8")):
         parts += re.split(r"(?m)^\$ ", text)[1:] if language == "console" else []
         if text.startswith(FILE):

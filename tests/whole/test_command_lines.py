@@ -1,7 +1,5 @@
 """Command lines of several rooms: a wrong one is refused in one line, and a bare name finds its file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -18,17 +16,17 @@ WRONG = {
 
 
 @pytest.mark.parametrize("words", WRONG)
-def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str) -> None:
+def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words):
     check_wrong(words, WRONG[words])
 
 
-def test_a_refused_argument_is_called_as_in_the_help(tmp_path: Path) -> None:
+def test_a_refused_argument_is_called_as_in_the_help(tmp_path):
     done = run("batch", "publishd", "--json", cwd=tmp_path)
     assert done.stderr.startswith("error: SWEEP = 'publishd': ")
     assert json.loads(done.stdout)["error"]["field"] == "SWEEP"
 
 
-def test_a_bare_name_finds_its_file(tmp_path: Path) -> None:
+def test_a_bare_name_finds_its_file(tmp_path):
     (tmp_path / "mine.toml").write_text(templates()["single-embedded"].read_text("utf-8"), "utf-8")
     done = run("build", "mine", "--only", "unit", "--formats", "stl", cwd=tmp_path)
     assert done.returncode == 0

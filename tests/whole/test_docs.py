@@ -1,7 +1,5 @@
 """Every example in README.md and in docs/ and its folders runs, and every link leads somewhere."""
 
-from __future__ import annotations
-
 import doctest
 import os
 import re
@@ -22,7 +20,7 @@ RUN = ("toml", "python", "python notebook", "python brep", "console")
 NOT_RUN = ("sh", "text", "json", "yaml")
 
 
-def _blocks(language: str) -> list:
+def _blocks(language):
     return [
         pytest.param(text, id=f"{page.relative_to(ROOT).with_suffix('')}-{i}")
         for page in pages()
@@ -30,11 +28,11 @@ def _blocks(language: str) -> list:
     ]
 
 
-def _pages_with(language: str) -> list:
+def _pages_with(language):
     return [pytest.param(page, id=page.stem) for page in pages() if blocks(page, language)]
 
 
-def test_no_example_drops_out(tmp_path: Path) -> None:
+def test_no_example_drops_out(tmp_path):
     """An independent walk, line by line, counts the fences; a page in a new folder is found."""
     fences = [
         line.removeprefix("```").strip()
@@ -55,7 +53,7 @@ def test_no_example_drops_out(tmp_path: Path) -> None:
         run_console(page, tmp_path)
 
 
-def test_shown_output_is_compared(tmp_path: Path) -> None:
+def test_shown_output_is_compared(tmp_path):
     output = ["a", "b", "c", "d"]
     assert missing(["a", "...", "c", "d"], output) is None
     assert missing(["a", "..."], output) is None
@@ -73,7 +71,7 @@ def test_shown_output_is_compared(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", _blocks("toml"))
-def test_toml_examples_are_specs(text: str) -> None:
+def test_toml_examples_are_specs(text):
     data = tomllib.loads(text)
     if data.get("design") in ("embedded", "encapsulating"):
         from_data(data)
@@ -82,13 +80,13 @@ def test_toml_examples_are_specs(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", _blocks("python"))
-def test_python_examples_run(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_examples_run(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
 
 
 @pytest.mark.parametrize("room", ["shape", "meshcheck", "sweeps", "arrays"])
-def test_examples_of_docstrings_run(room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_of_docstrings_run(room, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     module, finder = import_module(f"unitcad.{room}"), doctest.DocTestFinder(recurse=False)
     found = [test for name in module.__all__ for test in finder.find(getattr(module, name), name) if test.examples]
@@ -99,26 +97,26 @@ def test_examples_of_docstrings_run(room: str, tmp_path: Path, monkeypatch: pyte
 @pytest.mark.parametrize(
     "page", [page for page in pages() if blocks(page, "python notebook")], ids=lambda page: page.stem
 )
-def test_notebook_pages_run_from_top_to_bottom(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_notebook_pages_run_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": "__main__"}
+    names = {"__name__": "__main__"}
     for i, cell in enumerate(blocks(page, "python notebook")):
         exec(compile(cell, f"cell {i}", "exec"), names)
 
 
 @pytest.mark.parametrize("text", _blocks("python brep"))
-def test_examples_with_a_brep_library_run(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_with_a_brep_library_run(text, tmp_path, monkeypatch):
     pytest.importorskip("build123d")
     monkeypatch.chdir(tmp_path)
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
 
 
 @pytest.mark.parametrize("page", _pages_with("console"))
-def test_console_examples_run(page: Path, tmp_path: Path) -> None:
+def test_console_examples_run(page, tmp_path):
     run_console(page, tmp_path)
 
 
-def test_the_readme_shows_the_output_of_its_first_command(tmp_path: Path) -> None:
+def test_the_readme_shows_the_output_of_its_first_command(tmp_path):
     """The text block, and nothing before or between its lines; the folder follows."""
     command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "-o", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -129,7 +127,7 @@ def test_the_readme_shows_the_output_of_its_first_command(tmp_path: Path) -> Non
 LINK = re.compile(r"\]\(([^)\s#]*)(?:#([^)\s]+))?\)")
 
 
-def _anchors(text: str) -> set[str]:
+def _anchors(text):
     """The headings of a page as GitHub writes them in links."""
     headings = re.findall(r"^#+ +(.+?) *$", re.sub(BLOCK, "", text), re.MULTILINE)
     plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower() for heading in headings]
@@ -139,7 +137,7 @@ def _anchors(text: str) -> set[str]:
 GENERATED = {(ROOT / "docs" / name).resolve(): text for name, text in generated_pages().items()}
 
 
-def _lost(page: Path, text: str) -> list[str]:
+def _lost(page, text):
     """The links of a page's text to files or headings that are not there."""
     lost = []
     for match in LINK.finditer(BLOCK.sub("", text)):
@@ -155,7 +153,7 @@ def _lost(page: Path, text: str) -> list[str]:
     return lost
 
 
-def test_links_within_the_pages_lead_to_a_file_and_a_heading() -> None:
+def test_links_within_the_pages_lead_to_a_file_and_a_heading():
     written = {page: page.read_text("utf-8") for page in [*ROOT.glob("*.md"), *pages()[1:]]}
     assert {str(page): lost for page, text in {**written, **GENERATED}.items() if (lost := _lost(page, text))} == {}
     python = ROOT / "docs" / "reference" / "python.md"
@@ -165,12 +163,12 @@ def test_links_within_the_pages_lead_to_a_file_and_a_heading() -> None:
     assert _lost(python, "".join(f"[a{link}" for link in gone)) == gone
 
 
-def test_the_citation_names_this_version() -> None:
+def test_the_citation_names_this_version():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
 
 
-def test_no_page_waits_for_a_figure() -> None:
+def test_no_page_waits_for_a_figure():
     waiting = re.compile(r"\b(?:TODO|TBD|FIXME|XXX|ESTIMATES|MEASURED_[A-Z]+)\b")
     for page in pages():
         prose = re.sub(r"`[^`\n]*`", "", BLOCK.sub("", page.read_text("utf-8")))

@@ -1,7 +1,5 @@
 """The gallery's specs: each builds with its moulds, its checks hold, and one number agrees with the published one."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -27,7 +25,7 @@ IN_CI = {"gel-dome", "sleeve-cluster", "lra-8mm"}
     "spec",
     [pytest.param(one, marks=() if one.stem in IN_CI else pytest.mark.long, id=one.stem) for one in SPECS],
 )
-def test_it_builds_and_all_its_checks_hold(spec: Path, tmp_path: Path) -> None:
+def test_it_builds_and_all_its_checks_hold(spec, tmp_path):
     assert len(spec.read_text().splitlines()) <= 30
     assert re.search(r"not expressible", spec.read_text(), re.I)
     command = [
@@ -53,12 +51,12 @@ def test_it_builds_and_all_its_checks_hold(spec: Path, tmp_path: Path) -> None:
         assert unit_volume(spec) == pytest.approx(gel_volume(spec.stem), rel=1.5e-3)  # tessellated to 0.02 mm
 
 
-def unit_volume(spec: Path) -> float:
+def unit_volume(spec):
     variant = unitcad.Variant.of(spec)
     return sum(variant.mesh(body).volume() for body in variant.unit if body.name == "layer1")
 
 
-def gel_volume(name: str) -> float:
+def gel_volume(name):
     """Return the exact volume of a gel drawn from its published lengths, mm3."""
     if name == "gel-pad":
         return (18.2 * 24.6 - (4 - math.pi) * 2.0**2) * 3.8 - POCKET
@@ -69,13 +67,13 @@ def gel_volume(name: str) -> float:
 @pytest.mark.parametrize(
     ("name", "diameter", "height"), [("lra-8mm", 8, 3.2), ("lra-10mm", 10, 3.6), ("exciter-13mm", 13, 6.5)]
 )
-def test_an_actuator_has_its_published_size(name: str, diameter: float, height: float) -> None:
+def test_an_actuator_has_its_published_size(name, diameter, height):
     box = unitcad.Variant.of(GALLERY / f"{name}.toml").mesh("motor").bounding_box()
     assert box[3] - box[0] == pytest.approx(diameter, abs=0.02)  # of equal area
     assert box[5] - box[2] == pytest.approx(height, abs=1e-3)
 
 
-def test_the_arrays_have_their_published_numbers() -> None:
+def test_the_arrays_have_their_published_numbers():
     arrays = pytest.importorskip("unitcad.arrays")
     ring = arrays.load_array(GALLERY / "forearm-ring.toml")
     assert 2 * math.pi * ring.radius_mm == pytest.approx(245, abs=0.1)

@@ -1,7 +1,5 @@
 """The same bytes on every processor: OpenBLAS and NumPy take other code on each, and a process may choose it."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess
@@ -37,7 +35,7 @@ for words in (
 """
 
 
-def written(folder: Path, **environment: str) -> tuple[set[str], dict[str, str]]:
+def written(folder, **environment):
     """Return the code that OpenBLAS took, and the hash of each file that a process with this environment wrote."""
     folder.mkdir()
     done = subprocess.run(
@@ -58,7 +56,7 @@ def written(folder: Path, **environment: str) -> tuple[set[str], dict[str, str]]
 
 
 @pytest.fixture(scope="module")
-def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str, str]]:
+def usual(tmp_path_factory):
     """What a process writes that takes the code for this very processor."""
     return written(tmp_path_factory.mktemp("usual") / "out")
 
@@ -66,9 +64,7 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str,
 @pytest.mark.parametrize(
     "core", ["Haswell", *(pytest.param(core, marks=pytest.mark.long) for core in ("Zen", "SkylakeX", "Prescott"))]
 )
-def test_another_core_of_openblas_writes_the_same_bytes(
-    core: str, usual: tuple[set[str], dict[str, str]], tmp_path: Path
-) -> None:
+def test_another_core_of_openblas_writes_the_same_bytes(core, usual, tmp_path):
     cores, files = written(tmp_path / "out", OPENBLAS_CORETYPE=core)
     if cores == usual[0]:
         pytest.skip(f"{core} is this processor's own code, or it lacks it")

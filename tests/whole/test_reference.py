@@ -23,7 +23,7 @@ from unitcad.spec.raw import RawSpec
 PAGES = pages()
 
 
-def test_the_spec_page_has_every_key_of_every_table() -> None:
+def test_the_spec_page_has_every_key_of_every_table():
     for header, table in tables(RawSpec):
         section = PAGES["reference/spec-file.md"].split(f"## {header or 'The file'}\n")[1].split("\n## ")[0]
         assert re.findall(r"(?m)^\| `(\w+)` \|", section) == list(fields_of(table)), header
@@ -38,7 +38,7 @@ def test_the_spec_page_has_every_key_of_every_table() -> None:
         ("tissue", catalogue.Tissue),
     ],
 )
-def test_every_key_of_the_catalogue_has_its_range(kind: str, entry: type[Struct]) -> None:
+def test_every_key_of_the_catalogue_has_its_range(kind, entry):
     section = PAGES["reference/spec-file.md"].split(f"## [{kind}.NAME")[1].split("\n## ")[0]
     for key, annotated in kinds_of(entry):
         (note,) = annotated.__metadata__
@@ -47,7 +47,7 @@ def test_every_key_of_the_catalogue_has_its_range(kind: str, entry: type[Struct]
         assert f"| `{key}` | {span}, table |  | {note.description[0].upper()}{note.description[1:]} |" in section
 
 
-def test_every_kind_of_file_has_a_page_and_every_key_a_description() -> None:
+def test_every_kind_of_file_has_a_page_and_every_key_a_description():
     kinds = {"spec", "array", "sweep", "target", "campaign", "fit", "phantom", "cast-record"}
     assert {kind.name for kind in FILES} == kinds
     for kind in FILES:
@@ -60,7 +60,7 @@ def test_every_kind_of_file_has_a_page_and_every_key_a_description() -> None:
         keys_of_file("plain", Plain)
 
 
-def test_the_command_line_page_has_every_command_and_option() -> None:
+def test_the_command_line_page_has_every_command_and_option():
     group = typer.main.get_command(app)
     page = PAGES["reference/command-line.md"]
     for name in commands():
@@ -70,12 +70,12 @@ def test_the_command_line_page_has_every_command_and_option() -> None:
             assert all(option in section for parameter in one.params for option in parameter.opts if option[0] == "-")
 
 
-def test_every_check_and_finding_has_a_section() -> None:
+def test_every_check_and_finding_has_a_section():
     assert re.findall(r"(?m)^## (C\d+) ", PAGES["reference/mould-checks.md"]) == list(mould_checks())
     assert re.findall(r"(?m)^## (L\d+) ", PAGES["reference/recording-findings.md"]) == list(RULES)
 
 
-def test_the_page_has_a_section_for_each_rule() -> None:
+def test_the_page_has_a_section_for_each_rule():
     page = PAGES["reference/mesh-rules.md"]
     assert re.findall(r"(?m)^### (\w+)", page) == list(rules())
     for rule in rules().values():

@@ -1,7 +1,5 @@
 """What a build writes passes `unitcad check` as it is, against its manifest too."""
 
-from pathlib import Path
-
 import pytest
 from typer.testing import CliRunner
 
@@ -19,11 +17,11 @@ IN_CI = {*ALL_FORMATS, "embedded", "hex-19"}
     "template",
     [pytest.param(one, marks=() if one in IN_CI else pytest.mark.long) for one in sorted(every_template())],
 )
-def test_a_result_passes_check_and_its_manifest(template: str, tmp_path: Path) -> None:
+def test_a_result_passes_check_and_its_manifest(template, tmp_path):
     passes(template, tmp_path, "stl,3mf,step,glb" if template in ALL_FORMATS else "stl,3mf")
 
 
-def test_an_array_of_a_body_file_in_pockets_passes_check(tmp_path: Path) -> None:
+def test_an_array_of_a_body_file_in_pockets_passes_check(tmp_path):
     """Its disc is 0.03 mm larger than said, which a pocket takes."""
     body = realise(cut(cylinder(7.03, 0, 4.5), [cylinder(3.7, -1, 2)]), 96)
     (tmp_path / "disc.stl").write_bytes(stl(*arrays(body), "disc"))
@@ -33,7 +31,7 @@ def test_an_array_of_a_body_file_in_pockets_passes_check(tmp_path: Path) -> None
     passes(str(tmp_path / "array.toml"), tmp_path, "stl,3mf,step,glb")
 
 
-def passes(subject: str, out: Path, formats: str) -> None:
+def passes(subject, out, formats):
     built = CliRunner().invoke(
         app, ["build", subject, "-o", str(out), "--only", "unit,moulds", "--formats", formats, "--no-check"]
     )

@@ -1,7 +1,5 @@
 """The docs as a site: every link leads somewhere, and nothing is loaded from outside."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -20,7 +18,7 @@ LOADED = re.compile(
 )
 
 
-def build(source: Path, target: Path) -> subprocess.CompletedProcess[str]:
+def build(source, target):
     # Not --quiet: strict then counts no warnings.
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(source / "mkdocs.yml")]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
@@ -29,13 +27,13 @@ def build(source: Path, target: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def loaded(folder: Path) -> list[str]:
+def loaded(folder):
     """What the pages and style sheets of a site load from outside."""
     files = [path for path in folder.rglob("*") if path.suffix in (".html", ".css")]
     return ["".join(found) for path in files for found in LOADED.findall(path.read_text("utf-8"))]
 
 
-def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path: Path) -> None:
+def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path):
     done = build(ROOT, tmp_path / "site")
     assert done.returncode == 0, done.stderr
     assert loaded(tmp_path / "site") == []
@@ -49,7 +47,7 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path: Path)
         ), f"the index of the docs lacks {relative}"
 
 
-def test_a_lost_link_fails_the_site(tmp_path: Path) -> None:
+def test_a_lost_link_fails_the_site(tmp_path):
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "mkdocs.yml", tmp_path)
     with (tmp_path / "docs/index.md").open("a") as page:

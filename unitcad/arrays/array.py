@@ -7,6 +7,7 @@ rows' axis and the limb's. Seen from outside, rows are lettered from the top (th
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -121,8 +122,7 @@ class Array:
 
     def paths_of(self, unit: Spec) -> tuple[str, ...]:
         """Return the paths at which `asked` has a unit: "unit." first, if it is the array's own, then its places."""
-        tables = {"unit.": self.asked, **{f"place.{i}.unit.": own for i, own in enumerate(self.asked.get("place", ()))}}
-        return tuple(path for path, table in tables.items() if table.get("unit") == to_data(unit))
+        return tuple(f"{path}." for path, table in units_in(self.asked).items() if table == to_data(unit))
 
     def placed(self, name: str) -> Placed:
         """Return the place of that name. Raises KeyError."""
@@ -130,3 +130,14 @@ class Array:
 
     def __repr__(self) -> str:
         return f"Array({self.name!r}: {self.construction}, {len(self.places)} units of {self.unit.diameter_mm:g} mm)"
+
+
+def units_in(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the units of an array's plain data, which nobody checked, by their paths: "unit" first, then of places."""
+    places = data.get("place")
+    tables = {f"place.{i}.unit": place for i, place in enumerate(places if isinstance(places, list) else ())}
+    return {
+        path: table["unit"]
+        for path, table in {"unit": data, **tables}.items()
+        if isinstance(table, Mapping) and "unit" in table
+    }

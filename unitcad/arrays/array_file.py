@@ -8,22 +8,24 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
-from unitcad.arrays.array import Array, Placed, Sheet
-from unitcad.arrays.array_tables import AskedArray, PlaceTable
+from unitcad.arrays.array import Array, Placed, Sheet, units_in
+from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.circuit import outline
 from unitcad.arrays.constructions import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
 from unitcad.arrays.offers import suggest_for_array
 from unitcad.arrays.sheet import middle_radius, sheet_of
-from unitcad.arrays.tails import Blocked, angles
+from unitcad.arrays.tails import Blocked, angles, length_field, tail_length
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
@@ -37,7 +39,7 @@ from unitcad.spec.toml import line_of, text_of
 from unitcad.text import join_words
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.load import apply_changes, named_file, override, shipped_files
-from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of
+from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, put
 from unitcad.validation.suggestions import every_fault, numbers
 
 
@@ -77,12 +79,10 @@ def with_changes(
 def expand(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
     """Return an array's plain data with the whole spec of each unit in it. Raises Refusal for a unit not found."""
     whole = copy.deepcopy(dict(data))
-    if "unit" in whole:
-        whole["unit"] = unit_data(whole["unit"], "unit", folder)
-    places = whole.get("place")
-    for i, place in enumerate(places if isinstance(places, list) else ()):
-        if isinstance(place, dict) and "unit" in place:
-            place["unit"] = unit_data(place["unit"], f"place.{i}.unit", folder)
+    if isinstance(whole.get("place"), tuple):
+        whole["place"] = list(whole["place"])
+    for path, unit in units_in(whole).items():
+        put(whole, path, unit_data(unit, path, folder))
     return whole
 
 
@@ -136,32 +136,22 @@ def layout_of(asked: AskedArray) -> tuple[Any, LayoutKind]:
 
 def places_of(asked: AskedArray, points: list[Point]) -> dict[int, int]:
     """Return the number of each point that a [[place]] speaks of, with that table's number."""
+    names = {p.name: n for n, p in enumerate(points)}
+    cells = {(p.column + 1, p.row + 1): n for n, p in enumerate(points)}
     found: dict[int, int] = {}
     for i, place in enumerate(asked.place):
-        index = _number(place, i, points)
+        field, given = f"place.{i}.at", place.at if isinstance(place.at, str) else list(place.at)
+        index = names.get(place.at) if isinstance(place.at, str) else cells.get(place.at)
+        if index is None:
+            if isinstance(place.at, str):
+                raise unknown_name(field, place.at, list(names))
+            column, row = place.at
+            nearest = min(cells, key=lambda at: (abs(at[0] - column) + abs(at[1] - row), at))
+            raise Refusal(field, given, "there is no such column and row", list(nearest))
         if index in found:
-            raise Refusal(f"place.{i}.at", _shown(place), f"place.{found[index]} speaks of it too")
+            raise Refusal(field, given, f"place.{found[index]} speaks of it too")
         found[index] = i
     return found
-
-
-def _number(place: PlaceTable, i: int, points: list[Point]) -> int:
-    """Return the number of the point that a place speaks of."""
-    if isinstance(place.at, str):
-        names = [p.name for p in points]
-        if place.at not in names:
-            raise unknown_name(f"place.{i}.at", place.at, names)
-        return names.index(place.at)
-    column, row = place.at
-    there = {(p.column + 1, p.row + 1): n for n, p in enumerate(points)}
-    if (column, row) not in there:
-        nearest = min(there, key=lambda at: (abs(at[0] - column) + abs(at[1] - row), at))
-        raise Refusal(f"place.{i}.at", [column, row], "there is no such column and row", list(nearest))
-    return there[column, row]
-
-
-def _shown(place: PlaceTable) -> object:
-    return place.at if isinstance(place.at, str) else list(place.at)
 
 
 def schema() -> dict[str, Any]:
@@ -226,12 +216,9 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
         sound = sound_array(whole)
         every = every_fault(first, whole, partial(array_of, lay_tails=lay_tails), sound)
         if len(every) == 1:
-            every = [
-                suggest_for_array(
-                    first, whole, makeable_array if lay_tails else partial(array_of, lay_tails=False), sound
-                )
-            ]
-        if path is not None:
+            judge = makeable_array if lay_tails else partial(array_of, lay_tails=False)
+            every = [suggest_for_array(first, whole, judge, sound)]
+        if path:
             for one in every:
                 _locate(one, path, data, written, whole)
         every[0].others = tuple(every[1:])
@@ -324,18 +311,20 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
         apart = max(unit.diameter_mm + way.apart(unit)[0] for unit in units)
         _check_closes(asked, table, sheet, middle, apart)
     _check_apart(way, points, units, kind, table, middle)
+    given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
+    placed = [
+        Placed(name=p.name, x=p.x, y=p.y, angle_deg=float(given.get(n) or 0.0), unit=units[n])
+        for n, p in enumerate(points)
+    ]
+    if way.own_tails and lay_tails:
+        placed = _turned(asked, placed, given, places, sheet)
     return Array(
         name=asked.name,
         construction=asked.array,
         cast=asked.limb.cast,
         radius_mm=asked.limb.radius_mm,
         layout=dict(asked.layout),
-        places=tuple(
-            Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
-            for p, each, angle in zip(
-                points, units, _angles(asked, way, points, units, places, sheet, lay_tails), strict=True
-            )
-        ),
+        places=tuple(placed),
         sheet=sheet,
         circuit=asked.circuit,
         asked=_settled(data, unit, asked, units, places),
@@ -371,7 +360,7 @@ def _check_closes(asked: AskedArray, table: Any, sheet: Sheet, middle: float, ap
 def with_formats(array: Array, formats: Iterable[str]) -> Array:
     """Return the array with other formats for the files of its units, patch and tools."""
     data = copy.deepcopy(array.asked)
-    for unit in _unit_tables(data):
+    for unit in units_in(data).values():
         unit["output"]["formats"] = list(formats)
     return array_of(data)
 
@@ -380,7 +369,7 @@ def array_hash(array: Array) -> str:
     """Return the SHA-256 of an array's settled data without names and formats."""
     data = copy.deepcopy(array.asked)
     del data["name"]
-    for unit in _unit_tables(data):
+    for unit in units_in(data).values():
         del unit["name"], unit["output"]["formats"]
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
@@ -388,10 +377,6 @@ def array_hash(array: Array) -> str:
 def to_toml(array: Array) -> str:
     """Return the array as TOML, its units' specs whole in it: the same array when read again."""
     return text_of(array.asked)
-
-
-def _unit_tables(settled: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [settled["unit"], *(place["unit"] for place in settled.get("place", ()) if "unit" in place)]
 
 
 def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> Spec:
@@ -453,54 +438,39 @@ def _check_apart(
 ) -> None:
     """Raise Refusal, with the pitch that fits, for two units nearer to each other than the construction can make."""
     order = sorted(range(len(points)), key=lambda i: points[i].x)
-    apart = {id(unit): way.apart(unit) for unit in units}
-    reach = max(unit.diameter_mm for unit in units) + max(gap for gap, _ in apart.values())
-    worst: tuple[float, Point, Point, float, str] | None = None
-    for n, i in enumerate(order):
-        for j in order[n + 1 :]:
-            p, q = points[i], points[j]
-            if q.x - p.x >= reach:
-                break
-            gap, why = max(apart[id(units[i])], apart[id(units[j])])
-            needed = (units[i].diameter_mm + units[j].diameter_mm) / 2 + gap
-            short = needed - ((p.x - q.x) ** 2 + (p.y - q.y) ** 2) ** 0.5
-            # Largest error of snapping two centres to the grid.
-            if short > 2 / 1024 and (worst is None or short > worst[0] + 1e-9):
-                one, other = sorted((p, q), key=lambda point: (point.row, point.column))
-                worst = short, one, other, needed, why
-    if worst:
-        refusal = kind.wider(table, middle, (worst[1], worst[2]), up(worst[3]))
-        raise Refusal(refusal.field, refusal.value, f"{refusal.limit}: {worst[4]}", refusal.nearest)
+    apart = [way.apart(units[i]) for i in order]
+    x, y = np.array([(points[i].x, points[i].y) for i in order]).T
+    radii, gaps = np.array([units[i].diameter_mm / 2 for i in order]), np.array([gap for gap, _ in apart])
+    needed = np.add.outer(radii, radii) + np.maximum.outer(gaps, gaps)
+    short = np.triu(needed - np.hypot(np.subtract.outer(x, x), np.subtract.outer(y, y)), 1)
+    # Largest error of snapping two centres to the grid.
+    if short.max() > 2 / 1024:
+        i, j = divmod(int(np.argmax(short > short.max() - 1e-9)), len(order))
+        one, other = sorted((points[order[i]], points[order[j]]), key=lambda point: (point.row, point.column))
+        refusal = kind.wider(table, middle, (one, other), up(float(needed[i, j])))
+        why = max(apart[i], apart[j])[1]
+        raise Refusal(refusal.field, refusal.value, f"{refusal.limit}: {why}", refusal.nearest)
 
 
-def _angles(
-    asked: AskedArray,
-    way: Construction,
-    points: list[Point],
-    units: list[Spec],
-    places: dict[int, int],
-    sheet: Sheet,
-    lay_tails: bool,
-) -> list[float]:
-    """Return the units' angles, degrees. Raises Refusal for a tail that finds no way."""
-    given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
-    wanted = {n: float(angle or 0.0) for n, angle in given.items()}
-    if not (way.own_tails and lay_tails):
-        return [wanted.get(n, 0.0) for n in range(len(points))]
+def _turned(
+    asked: AskedArray, placed: list[Placed], given: Collection[int], places: dict[int, int], sheet: Sheet
+) -> list[Placed]:
+    """Return the places, each turned so that its tail finds a way. Raises Refusal for one that finds none."""
     try:
-        return angles(points, units, wanted, sheet)
+        found = angles(placed, given, sheet)
     except Blocked as blocked:
-        n, unit = blocked.owner, units[blocked.owner]
-        name, i = points[n].name, places.get(blocked.owner)
+        place, i = placed[blocked.owner], places.get(blocked.owner)
+        if blocked.owner in given:
+            limit = (
+                f"at this angle the tail of {place.name} runs into {blocked.by}; it may be {blocked.longest:g} mm long"
+            )
+            raise Refusal(f"place.{i}.angle_deg", place.angle_deg, limit, blocked.turned) from None
         at_unit = f"place.{i}.unit" if i is not None and asked.place[i].unit is not None else "unit"
-        table = "fpcb.tail_length_mm" if unit.fpcb else "wires.length_mm"
-        length = unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
-        if n in wanted:
-            limit = f"at this angle the tail of {name} runs into {blocked.by}; it may be {blocked.longest:g} mm long"
-            raise Refusal(f"place.{i}.angle_deg", wanted[n], limit, blocked.turned) from None
-        limit = f"the tail of {name} finds no straight way between the units; it may be at most"
+        limit = f"the tail of {place.name} finds no straight way between the units; it may be at most"
         nearest = blocked.longest if blocked.longest >= 0.1 else None
-        raise Refusal(f"{at_unit}.{table}", length, f"{limit} {blocked.longest:g} mm", nearest) from None
+        field, length = f"{at_unit}.{length_field(place.unit)}", tail_length(place.unit)
+        raise Refusal(field, length, f"{limit} {blocked.longest:g} mm", nearest) from None
+    return [replace(place, angle_deg=angle) for place, angle in zip(placed, found, strict=True)]
 
 
 def _settled(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,6 @@ from manifold3d import Manifold
 from unitcad import files
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of
-from unitcad.arrays.crosstalk import crosstalk_lines
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds, PatchPart, patch_bodies, patch_moulds, patch_parts
 from unitcad.casting.steps import duration
@@ -159,19 +159,18 @@ def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
 
 def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
     shown = _Shown(folder, warn)
-    array, model = manifest["array"], _model(folder, warn)
+    array, model, drawn = manifest["array"], _model(folder, warn), [Path(path).name for path in manifest["pictures"]]
     parts = [
         '<div class="top"><div>',
         f"<h1>{escape(manifest['name'])}</h1>",
         f'<p class="line">{escape(_line(array))}</p>',
         _chips(manifest),
         "</div></div>",
-        *_section("Warnings", [_list(manifest["warnings"])]),
         *_section("3D", [VIEW if model else ""]),
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
         *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
-        *_section("Tools", [shown.of(f"pictures/{name}") for name in ("tools.png", *_pours(manifest))]),
+        *_section("Tools", [shown.of(f"pictures/{name}") for name in drawn if not name.startswith("patch-")]),
         *_section("Circuit", [shown.of(CIRCUIT)]),
         *_section("Casting", list(_casting(folder, shown.json("casting.json")))),
         *_section("Units", [_units(folder, manifest)]),
@@ -273,17 +272,11 @@ def _section(title: str, content: Iterable[str]) -> Iterator[str]:
 
 
 def _answer(crosstalk: Mapping[str, Any]) -> str:
-    if not crosstalk:
+    lines = crosstalk.get("answer")
+    if not lines or not isinstance(lines, list):  # none, or another program's file
         return ""
-    try:
-        first, *others = crosstalk_lines(dict(crosstalk))
-    except (KeyError, TypeError, ValueError, IndexError):  # another program's file
-        return ""
-    return f'<p class="lead">{escape(first)}</p>' + "".join(f"<p>{escape(line)}</p>" for line in others)
-
-
-def _pours(manifest: ArrayManifest) -> list[str]:
-    return [Path(path).name for path in manifest["pictures"] if Path(path).name.startswith("pour")]
+    first, *others = (escape(str(line)) for line in lines)
+    return f'<p class="lead">{first}</p>' + "".join(f"<p>{line}</p>" for line in others)
 
 
 def _casting(folder: Path, casting: Mapping[str, Any]) -> Iterator[str]:
@@ -367,11 +360,6 @@ def _checks(manifest: ArrayManifest) -> str:
     return table + (f"<ul>{broken}{meshes}</ul>" if broken or meshes else "")
 
 
-def _list(sentences: Iterable[str]) -> str:
-    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
-    return f"<ul>{items}</ul>" if items else ""
-
-
 def _files(manifest: ArrayManifest) -> str:
     own = [(path, entry["bytes"]) for path, entry in manifest["files"].items() if not path.startswith("units/")]
     rows = "".join(
@@ -424,8 +412,6 @@ def limb(array: Array) -> Manifold:
 
 SIZE = (960, 640)
 """Of a picture, px."""
-FOLDER = "pictures"
-WORN = f"{FOLDER}/patch-bent.png"
 GAP = 8.0
 """Between two pieces taken apart, mm."""
 _Eye = tuple[float, float, float]
@@ -435,30 +421,21 @@ ALONG = (0.35, -0.9, 0.45)
 SKIN_SIDE, BACK, ABOVE = (0.45, -0.8, -0.9), (0.45, -0.8, 0.9), (0.45, -1.0, 0.55)
 
 
-def picture_names(moulds: PatchMoulds) -> dict[str, str]:
-    """Return the scene of each picture, by its path: from the skin's side, from the back, the tools, each pour."""
-    names = {
-        f"{FOLDER}/patch-skin-side.png": "The patch from the skin's side",
-        f"{FOLDER}/patch-back.png": "The patch from its back",
-        f"{FOLDER}/tools.png": "The tools and the silicone, taken apart",
-    }
-    if moulds.arranged.radius_mm is not None:
-        names[WORN] = "The patch round its limb"
-    return names | {f"{FOLDER}/pour{s.index}.png": f"Pour {s.index}, cut open" for s in moulds.plan.steps}
+def pictures(moulds: PatchMoulds) -> dict[str, Callable[[], bytes]]:
+    """Return a function that draws the PNG of each picture, by its path."""
 
+    def shown(eye: _Eye, surfaces: Callable[[], Iterable[Surface]]) -> Callable[[], bytes]:
+        return lambda: draw(list(surfaces()), eye, SIZE)
 
-def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
-    """Return the PNG of each picture by its path."""
-    patch = [_solid(moulds, body) for body in patch_bodies(moulds.arranged)]
-    drawn = {
-        f"{FOLDER}/patch-skin-side.png": draw(patch, SKIN_SIDE, SIZE),
-        f"{FOLDER}/patch-back.png": draw(patch, BACK, SIZE),
-        f"{FOLDER}/tools.png": draw([_solid(moulds, *moved) for moved in take_apart(moulds)], ABOVE, SIZE),
-    }
+    def patch() -> Iterable[Surface]:
+        return (_solid(moulds, body) for body in patch_bodies(moulds.arranged))
+
+    apart = shown(ABOVE, lambda: (_solid(moulds, *moved) for moved in take_apart(moulds)))
+    names = {"patch-skin-side": shown(SKIN_SIDE, patch), "patch-back": shown(BACK, patch), "tools": apart}
     if moulds.arranged.radius_mm is not None:
-        drawn[WORN] = draw(list(_worn_bodies(moulds)), ALONG, SIZE)
-    cuts = [draw(list(_cut_open(moulds, step.index)), ABOVE, SIZE) for step in moulds.plan.steps]
-    return drawn | {f"{FOLDER}/pour{i + 1}.png": picture for i, picture in enumerate(cuts)}
+        names["patch-bent"] = shown(ALONG, partial(_worn_bodies, moulds))
+    names |= {f"pour{s.index}": shown(ABOVE, partial(_cut_open, moulds, s)) for s in moulds.plan.steps}
+    return {f"pictures/{name}.png": picture for name, picture in names.items()}
 
 
 def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
@@ -517,13 +494,12 @@ def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
     yield from ((lid,) for lid in plan.standing(step, "lid"))
 
 
-def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[Surface]:
+def _cut_open(moulds: PatchMoulds, step: Step) -> Iterator[Surface]:
     """Yield a pour as it is struck off, without its nearer half: cut through a row of units."""
-    step = moulds.plan.steps[index - 1]
     y = min((place.y for place in moulds.arranged.places), key=abs) + 1 / 512
     solids = [(moulds.solids[name], moulds.plan.tool(name).colour) for name in step.tools]
     colours = {body.step: body.colour for body in moulds.unit}
-    for shapes, pour in ((step.earlier, 1), (step.layer, index)):
+    for shapes, pour in ((step.earlier, 1), (step.layer, step.index)):
         solids += [(solid, colours[pour]) for solid in moulds.meshes(shapes)]
     for solid, colour in solids:
         yield Surface(*arrays(solid.trim_by_plane((0, 1, 0), y)), colour)

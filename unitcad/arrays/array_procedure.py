@@ -16,7 +16,7 @@ from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
 from unitcad.arrays.tails import covered_tails, longer_tails, where_they_end
-from unitcad.casting.bill import Item, bill, injecting, list_consumables, motor_name, mould_plates
+from unitcad.casting.bill import Item, bill, list_consumables, motor_name, mould_plates
 from unitcad.casting.figures import (
     LAY_IN_MIN,
     LIFT_MIN,
@@ -47,6 +47,7 @@ from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
+from unitcad.spec import Spec
 from unitcad.text import join_words, number, spaced
 
 
@@ -114,14 +115,14 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         name=spec.name,
         label=moulds.plan.label,
         **times(prepared, pours, out, "motors and circuit in", together),
-        printing=printing(moulds, printed_mm3, max(_heights(moulds))),
+        printing=printing(moulds, printed_mm3, _tallest(moulds)),
         preparation=prepared,
         pours=pours,
         bonds=tuple(_bonds(moulds)),
         release=out,
         assembly=together,
         measure=tuple(_measure_curved(moulds, grams)),
-        bill=(*_bill(moulds, [*flat_batches, batch], every), *injecting([batch])),
+        bill=tuple(_bill(moulds, [*flat_batches, batch], every)),
         last="Motors and circuit in",
     )
 
@@ -131,12 +132,10 @@ def _picture(step: Step, name: str) -> str:
     return picture_path(f"pour{step.index}-{name}")
 
 
-def _heights(moulds: PatchMoulds) -> Iterator[float]:
-    """Yield the heights of base and lid of the last pour as they are printed, mm."""
-    for tool in moulds.plan.tools:
-        if tool.step == len(moulds.plan.steps) and tool.made == "printed":
-            _, _, low, _, _, high = moulds.mesh(tool).bounding_box()
-            yield high - low
+def _tallest(moulds: PatchMoulds) -> float:
+    """Return the height of base or lid of the last pour as it is printed, mm."""
+    last = [tool for tool in moulds.plan.pieces if tool.step == len(moulds.plan.steps) and tool.made == "printed"]
+    return max(high - low for low, high in (moulds.mesh(tool).bounding_box()[2::3] for tool in last))
 
 
 def _base(moulds: PatchMoulds) -> str:
@@ -296,9 +295,6 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
             yield replace(item, quantity=item.quantity - places)
             yield Item("filament, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
-        elif item.item == "adhesive tape":
-            # The last pour is held by bands.
-            yield replace(item, quantity=item.quantity * (1 - 1 / len(moulds.plan.steps)))
         else:
             yield item
 
@@ -323,15 +319,13 @@ def pocket_bill(
     return tuple(_added([*_scaled(moulds.arranged, units), *own]))
 
 
-def counts(array: Array) -> list[int]:
-    """Return the number of places with each distinct unit, in the order of `Array.units`."""
+def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str, Procedure, int, int]]:
+    """Return each distinct unit with its folder, procedure and places, and how often its mould has to be filled."""
     held = Counter(array.units.index(place.unit) for place in array.places)
-    return [held[i] for i in range(len(array.units))]
-
-
-def castings(count: int, unit: Procedure) -> int:
-    """Return how often a unit's mould has to be filled for so many units."""
-    return math.ceil(count / unit.cells)
+    return [
+        (spec, folder, unit, held[i], math.ceil(held[i] / unit.cells))
+        for i, (spec, (folder, unit)) in enumerate(zip(array.units, units.items(), strict=True))
+    ]
 
 
 def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
@@ -352,19 +346,18 @@ def _wires(array: Array) -> Iterator[Item]:
 
 def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
     """Yield the lines of the units' bills for all units: their pieces once, consumables as often as they are used."""
-    for spec, count, (folder, unit) in zip(array.units, counts(array), units.items(), strict=True):
-        times = castings(count, unit)
+    for spec, folder, unit, count, castings in kinds(array, units):
         inside = {motor_name(spec), "flexible circuit", "wire"}
         for item in unit.bill:
             if item.made.startswith(("printed", "cut")):
                 yield replace(item, note=f"for {folder}{f': {item.note}' if item.note else ''}")
             elif item.unit == "g":
-                often = "1 casting" if times == 1 else f"{times} castings"
-                yield replace(item, quantity=times * item.quantity, note=f"{folder}, {often}: {item.note}")
+                often = "1 casting" if castings == 1 else f"{castings} castings"
+                yield replace(item, quantity=castings * item.quantity, note=f"{folder}, {often}: {item.note}")
             elif item.item in inside:
                 yield replace(item, quantity=count * item.quantity / unit.cells)
             elif item.made == "bought" and (item.item, item.unit) not in ONCE:
-                yield replace(item, quantity=times * item.quantity)
+                yield replace(item, quantity=castings * item.quantity)
             else:
                 yield item
 
@@ -439,7 +432,8 @@ def pocket_procedure(
     out = tuple(_out(moulds))
     together = tuple(_together(array, moulds))
     sheet = [("sheet: preparation", prepared), ("sheet: pour", poured), ("sheet: out of the mould", out)]
-    until = _side_by_side(phases([("units", cast)]), phases(sheet), _first_cure(units))
+    until = [*phases([("units", cast)]), *_later(phases(sheet), _first_cure(units))]
+    until.sort(key=lambda phase: phase.start_min)
     finish = max(phase.end_min for phase in until)
     line = (*until, *_later(phases([("units in", together)]), finish))
     pour = replace(pour_of(batch, poured), layer="sheet")
@@ -468,7 +462,7 @@ def pocket_procedure(
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",
         last="Units in",
-        castings=sum(castings(count, unit) for count, unit in zip(counts(array), units.values(), strict=True)),
+        castings=sum(castings for *_, castings in kinds(array, units)),
     )
 
 
@@ -484,18 +478,12 @@ def _later(line: Iterable[Phase], by: float) -> tuple[Phase, ...]:
     return tuple(replace(phase, start_min=phase.start_min + by) for phase in line)
 
 
-def _side_by_side(units: Iterable[Phase], sheet: Iterable[Phase], after: float) -> tuple[Phase, ...]:
-    """Return the phases of units and sheet in the order of their beginnings; the sheet's begin `after` so long."""
-    return tuple(sorted((*units, *_later(sheet, after)), key=lambda phase: phase.start_min))
-
-
 def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
     """Say how the units are made first: by their own procedures, as often as their mould has to be filled."""
-    for i, (count, (folder, unit)) in enumerate(zip(counts(array), units.items(), strict=True)):
-        times = castings(count, unit)
+    for i, (_, folder, unit, count, castings) in enumerate(kinds(array, units)):
         cavities = "one cavity" if unit.cells == 1 else f"{unit.cells} cavities"
-        filled = "one casting" if times == 1 else f"{times} castings, one after the other,"
-        take = "takes" if times == 1 else "take"
+        filled = "one casting" if castings == 1 else f"{castings} castings, one after the other,"
+        take = "takes" if castings == 1 else "take"
         whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
         # One sheet is cast, at the same time as the first of them.
         after = duration(_first_cure(units)) if not i else ""
@@ -504,28 +492,22 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
         yield BenchStep(
             "Cast the units",
             f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {filled} in moulds of {cavities} {take} "
-            f"{duration(times * whole)}, of which {duration(times * bench)} at the bench. "
+            f"{duration(castings * whole)}, of which {duration(castings * bench)} at the bench. "
             f"{beside}{more} Try every motor.",
             kind="cure",
-            minutes=times * bench,
-            wait_min=times * (whole - bench),
+            minutes=castings * bench,
+            wait_min=castings * (whole - bench),
         )
 
 
 def _sort(moulds: PatchMoulds) -> str:
-    tray, files = (
-        join_words(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base")),
-        join_words(mould_plates(moulds)),
-    )
+    tray = join_words(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base"))
+    files = join_words(mould_plates(moulds))
+    printed = " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
     return (
-        f"Print tray ({tray}){_and_blade(moulds)} as in {files}, without supports. The tray is engraved "
+        f"Print tray ({tray}){printed} as in {files}, without supports. The tray is engraved "
         f"{seen(f'B{moulds.plan.label}')}."
     )
-
-
-def _and_blade(moulds: PatchMoulds) -> str:
-    """Name the blade if it is printed too."""
-    return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
 
 
 def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedure]) -> Printing:

@@ -14,7 +14,7 @@ import json
 import re
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,10 +31,9 @@ from unitcad.arrays.array_file import (
     to_toml,
     with_formats,
 )
-from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, patch_glb, picture_names, pictures, write_array_page
+from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, patch_glb, pictures, write_array_page
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.circuit import crowded_tracks, has_circuit
-from unitcad.arrays.constructions import construction_of
+from unitcad.arrays.circuit import crowded_tracks
 from unitcad.arrays.crosstalk import extras
 from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
 from unitcad.arrays.offers import suggest_for_array
@@ -45,10 +44,7 @@ from unitcad.cache import Store, digest
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.procedure_text import files as written
-from unitcad.casting.procedure_text import step_section
 from unitcad.casting.steps import pour_warnings
-from unitcad.casting.views import picture_path, views
-from unitcad.casting.views import pictures as bench_pictures
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal
@@ -59,17 +55,16 @@ from unitcad.pipeline.manifest import (
     NO_KERNEL,
     UNCHECKED,
     BodyFile,
-    Geometry,
     Manifest,
     MeshFinding,
     PartRecord,
+    PourRecord,
     Skipped,
     count_findings,
     printed_mm3,
 )
 from unitcad.pipeline.plan import (
     OUTPUTS,
-    Planned,
     begun,
     body_key,
     code_version,
@@ -156,49 +151,88 @@ class Arrayed(Compound):
         moulds = self.moulds
         moulds.plan  # noqa: B018  # refuses before the long work begins
         units = {
-            folder: _unit(array, unit, self.given, only, check, store, progress)
-            for folder, unit in unit_folders(array).items()
+            folder: _unit(moulds, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()
         }
         own: dict[str, bytes] = {Arrayed.file: to_toml(array).encode()}
         shared: dict[str, str] = {}
-        for folder, product in units.items():
-            own |= {f"{folder}/{path}": content for path, content in product.own.items()}
-            shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
         parts: list[PartRecord] = []
-        shape: Geometry | None = None
+        findings: list[FindingRecord] = []
+        meshes: list[MeshFinding] = []
+        steps: list[PourRecord] = []
+        made: Procedure | None = None
+        drawn: list[str] = []
         if "pdf" in self.formats and "moulds" in only:
             own[DRAWING] = drawing(moulds, ("moulds",))
-        if {"moulds", "casting"} & set(only):
-            shape = geometry(moulds, ["moulds"], check and "moulds" in only, store, progress)
-            if "moulds" in only:
-                shared |= shape["files"]
-                parts += shape["parts"]
+        if moulded := [name for name in ("moulds", "casting") if name in only]:
+            shape = geometry(moulds, moulded, check, store, progress)
+            shared |= shape["files"]
+            parts = list(shape["parts"])
+            findings, meshes = list(mould_findings(moulds.spec, shape)), list(shape["check"])
+            steps = [
+                {**step, "material": pour.material}
+                for step, pour in zip(shape["steps"], moulds.plan.steps, strict=True)
+            ]
         if "unit" in only:
             progress("patch")
-            made, files = _patch(moulds, store)
-            parts, shared = [*parts, *made], shared | files
-        drawn: list[str] = []
-        tracks = crowded_tracks(array) if has_circuit(array) else []
-        warned = [*covered_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
+            of_patch, files = _patch(moulds, store)
+            parts, shared = [*parts, *of_patch], shared | files
         if {"unit", "moulds"} & set(only):
             progress("pictures")
-            shown = _pictures(moulds, store)
-            drawn, shared = list(shown), shared | shown
-        if "casting" in only and shape:
+            blank = moulds.blank
+            for path, draw in pictures(blank).items():
+                shared[path] = store.file(geometry_key(blank, path), draw)
+                drawn.append(path)
+        if "casting" in only:
             progress("casting")
-            for step in moulds.plan.steps:
-                draw = partial(step_section, moulds, step)
-                key = geometry_key(moulds, f"section of pour {step.index}")
-                shared[f"step{step.index}-section.svg"] = store.file(key, lambda draw=draw: draw().encode())
-            shared |= _step_pictures(moulds, store)
-            made = _procedure(moulds, shape, units)
+            made = _procedure(moulds, [step["layer_volume_mm3"] for step in steps], printed_mm3(parts), units)
             own |= {path: text.encode() for path, text in written(made).items()}
-            warned += pour_warnings([asdict(pour) for pour in made.pours])
         progress("circuit and crosstalk")
         more, lacking = extras(array, only)
         own |= more
-        manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
-        manifest["skipped"] += [Skipped(output=output, reason=reason) for output, reason in lacking.items()]
+        warned = [
+            *covered_tails_warning(array),
+            *crowded_tracks(array),
+            *shallow_grooves(moulds),
+            *play_missing(moulds),
+            *(pour_warnings([asdict(pour) for pour in made.pours]) if made else []),
+        ]
+        first = next(iter(units.values())).manifest
+        for folder, product in units.items():
+            own |= {f"{folder}/{path}": content for path, content in product.own.items()}
+            shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
+            of_unit = product.manifest
+            findings += [
+                FindingRecord(**{**one, "where": f"{folder}: {one['where']}"}) for one in of_unit["mould_checks"]
+            ]
+            found = of_unit["check"]["findings"]
+            meshes += [MeshFinding(**{**one, "path": f"{folder}/{one['path']}"}) for one in found]
+            parts += [_under(folder, part) for part in of_unit["parts"]]
+            warned += [f"{folder}: {line}" for line in of_unit["warnings"]]
+        manifest = ArrayManifest(
+            name=array.name,
+            design=array.unit.design,
+            printer=array.unit.moulds.printer,
+            hash=self.hash[:12],
+            outputs=list(only),
+            label=moulds.plan.label if moulded else None,
+            warnings=warned,
+            air_ring_mm=first["air_ring_mm"],
+            mesh={**first["mesh"], "segments": moulds.segments},
+            parts=parts,
+            steps=steps,
+            mould_checks=findings,
+            estimate=first["estimate"],
+            check=count_findings(meshes),
+            pictures=drawn,
+            casting=sorted(path for path in own if path in CASTING) or None,
+            skipped=[
+                *_skipped(only, check, first["skipped"]),
+                *(Skipped(output=output, reason=reason) for output, reason in lacking.items()),
+            ],
+            versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
+            files={},
+            array=_record(array, list(units)),
+        )
         return finish(manifest, own, shared, store)
 
 
@@ -212,153 +246,61 @@ def unit_folders(array: Array) -> dict[str, Spec]:
 
 
 def _unit(
-    array: Array,
-    unit: Spec,
-    given: frozenset[str],
-    only: Sequence[str],
-    check: bool,
-    store: Store,
-    progress: Progress,
+    moulds: PatchMoulds, unit: Spec, only: Sequence[str], check: bool, store: Store, progress: Progress
 ) -> Product:
     """Return a unit's own result; without moulds and casting if it is cast with the sheet."""
-    apart = construction_of(array.construction, array.cast).own_tails
-    wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
+    wanted = [name for name in only if moulds.construction.own_tails or name not in ("moulds", "casting")] or ["unit"]
     progress.prefix = "unit: "
     subject = Subject(unit)
-    subject.given = _given(array, unit, given)
+    subject.given = _given(moulds, unit)
     product = subject.make(wanted, check, store, progress)
     progress.prefix = ""
     return product
 
 
-def _given(array: Array, unit: Spec, given: frozenset[str]) -> frozenset[str]:
+def _given(moulds: PatchMoulds, unit: Spec) -> frozenset[str]:
     """Return the paths of given values in a unit's own spec."""
-    paths = array.paths_of(unit)
-    return frozenset(key.removeprefix(path) for key in given for path in paths if key.startswith(path))
+    paths = moulds.arranged.paths_of(unit)
+    return frozenset(key.removeprefix(path) for key in moulds.given for path in paths if key.startswith(path))
 
 
 def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[str, str]]:
     """Return records and files of the silicone that the units share, and the files of the whole patch."""
-    blank, bodies = moulds.blank, patch_bodies(moulds.arranged)
-    parts: dict[str, PartRecord] = {}
-    versions = sorted(kernel_versions(("glb",)).items())
-    table = (
-        [begun(step_file("patch/patch.step", blank, bodies, "patch"))] if "step" in moulds.spec.output.formats else []
-    )
-    for body in blank.unit:
-        parts[body.name] = {**record(blank, body), "material": _material(moulds, body.step), "files": {}}
-        if (solids := len(blank.mesh(body).decompose())) > 1:
-            parts[body.name]["solids"] = solids
-        path, key = f"patch/{file_stem(body)}.stl", partial(body_key, blank, body, "stl")
-        table.append(Planned(path, partial(stl_content, blank, body), key, form="stl", bodies=(body.name,)))
-    glb = partial(patch_glb, blank, patch_parts(moulds.arranged))
-    table.append(Planned("patch/patch.glb", glb, lambda: joint_key(blank, bodies, "glb", None, versions), form="glb"))
+    blank, bodies, formats = moulds.blank, patch_bodies(moulds.arranged), moulds.spec.output.formats
+    # A helper makes it in the meantime.
+    step = [begun(step_file("patch/patch.step", blank, bodies, "patch"))] if "step" in formats else []
+    parts: list[PartRecord] = []
     files: dict[str, str] = {}
-    for planned in reversed(table):
-        if planned.form in moulds.spec.output.formats:
-            files[planned.path] = store.file(planned.key(), planned.make)
-            if planned.form == "stl":
-                part = parts[planned.bodies[0]]
-                part["files"]["stl"] = BodyFile(path=planned.path, sha256=files[planned.path])
-    return list(parts.values()), files
+    for body in blank.unit:
+        material = moulds.plan.steps[(body.step or 1) - 1].material
+        part = PartRecord(**{**record(blank, body), "material": material, "files": {}})
+        if (solids := len(blank.mesh(body).decompose())) > 1:
+            part["solids"] = solids
+        if "stl" in formats:
+            path = f"patch/{file_stem(body)}.stl"
+            files[path] = store.file(body_key(blank, body, "stl"), partial(stl_content, blank, body))
+            part["files"]["stl"] = BodyFile(path=path, sha256=files[path])
+        parts.append(part)
+    if "glb" in formats:
+        draw = partial(patch_glb, blank, patch_parts(moulds.arranged))
+        files["patch/patch.glb"] = store.file(joint_key(blank, bodies, "patch.glb"), draw)
+    return parts, files | {planned.path: store.file(planned.key(), planned.make) for planned in step}
 
 
-def _pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
-    blank = moulds.blank
-    together = cache(lambda: pictures(blank))
-    return {
-        path: store.file(geometry_key(blank, path), lambda path=path: together()[path]) for path in picture_names(blank)
-    }
-
-
-def _step_pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
-    """Return the pictures of the procedure's steps: all drawn when the first is not kept yet."""
-    together = cache(lambda: bench_pictures(moulds))
-    return {
-        path: store.file(geometry_key(moulds.blank, path), lambda path=path: together()[path])
-        for path in map(picture_path, views(moulds))
-    }
-
-
-def _procedure(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) -> Procedure:
+def _procedure(
+    moulds: PatchMoulds, volumes: Sequence[float], printed: float, units: Mapping[str, Product]
+) -> Procedure:
     """Return how the array is cast."""
-    volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
-    apart = unit_folders(moulds.arranged) if moulds.construction.own_tails else {}
-    array, given = moulds.arranged, moulds.given
-    of_units = {folder: _of_unit(unit, units[folder], _given(array, unit, given)) for folder, unit in apart.items()}
-    return array_procedure(moulds, volumes, printed_mm3(shape["parts"]), of_units)
+    of_units = {}
+    for folder, unit in unit_folders(moulds.arranged).items() if moulds.construction.own_tails else ():
+        manifest, own = units[folder].manifest, MouldSet(unit, given=_given(moulds, unit))
+        of_each = [step["layer_volume_mm3"] for step in manifest["steps"]]
+        of_units[folder] = unit_procedure(own, of_each, printed_mm3(manifest["parts"]))
+    return array_procedure(moulds, volumes, printed, of_units)
 
 
-def _of_unit(unit: Spec, product: Product, given: frozenset[str]) -> Procedure:
-    manifest = product.manifest
-    volumes = [step["layer_volume_mm3"] for step in manifest["steps"]]
-    return unit_procedure(MouldSet(unit, given=given), volumes, printed_mm3(manifest["parts"]))
-
-
-def _material(moulds: PatchMoulds, step: int | None) -> str | None:
-    return moulds.plan.steps[step - 1].material if step else None
-
-
-def _manifest(
-    array: Array,
-    moulds: PatchMoulds,
-    only: Sequence[str],
-    check: bool,
-    shape: Geometry | None,
-    units: dict[str, Product],
-    parts: list[PartRecord],
-    drawn: list[str],
-    own: dict[str, bytes],
-    warned: list[str],
-) -> ArrayManifest:
-    """Return the manifest but for its files: the array's own records, and those of its units under their folders.
-
-    `warned`: of the array itself.
-    """
-    first = next(iter(units.values())).manifest
-    findings = mould_findings(moulds.spec, shape) if shape and check and "moulds" in only else []
-    meshes: list[MeshFinding] = list(shape["check"]) if shape and check and "moulds" in only else []
-    every = [*parts]
-    for folder, product in units.items():
-        manifest = product.manifest
-        findings += [
-            FindingRecord(**{**each, "where": f"{folder}: {each['where']}"}) for each in manifest["mould_checks"]
-        ]
-        meshes += [
-            MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
-        ]
-        every += [_under(folder, part) for part in manifest["parts"]]
-    unit_warnings = [f"{folder}: {line}" for folder, product in units.items() for line in product.manifest["warnings"]]
-    return ArrayManifest(
-        name=array.name,
-        design=array.unit.design,
-        printer=array.unit.moulds.printer,
-        hash=array_hash(array)[:12],
-        outputs=list(only),
-        label=moulds.plan.label if shape else None,
-        warnings=[*warned, *unit_warnings],
-        air_ring_mm=first["air_ring_mm"],
-        mesh={**first["mesh"], "segments": moulds.segments},
-        parts=every,
-        steps=[
-            {**step, "material": moulds.plan.steps[step["index"] - 1].material}
-            for step in (shape["steps"] if shape else [])
-        ],
-        mould_checks=findings,
-        estimate=first["estimate"],
-        check=count_findings(meshes),
-        pictures=drawn,
-        casting=sorted(path for path in own if path in CASTING) or None,
-        skipped=list(_skipped(array, only, check, first["skipped"])),
-        versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
-        files={},
-        array=_record(array, units),
-    )
-
-
-def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
-    """Return the manifest's block of the array itself."""
-    folders_of = list(units)
+def _record(array: Array, folders: list[str]) -> dict[str, Any]:
+    """Return the manifest's block of the array itself; `folders`: of its distinct units."""
     sheet = array.sheet
     return {
         "construction": array.construction,
@@ -375,14 +317,14 @@ def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
             "corner_mm": sheet.corner_mm,
             "strap_slots_mm": [list(slot) for slot in sheet.strap_slots],
         },
-        "units": folders_of,
+        "units": folders,
         "places": [
             {
                 "name": p.name,
                 "x_mm": p.x,
                 "y_mm": p.y,
                 "angle_deg": p.angle_deg,
-                "unit": folders_of[array.units.index(p.unit)],
+                "unit": folders[array.units.index(p.unit)],
             }
             for p in array.places
         ],
@@ -398,7 +340,7 @@ def _under(folder: str, part: PartRecord) -> PartRecord:
     return {**part, "name": f"{folder}: {part['name']}", "files": files}
 
 
-def _skipped(array: Array, only: Sequence[str], check: bool, of_unit: list[Skipped]) -> Iterator[Skipped]:
+def _skipped(only: Sequence[str], check: bool, of_unit: list[Skipped]) -> Iterator[Skipped]:
     if not check:
         yield Skipped(output="mould checks", reason=UNCHECKED)
         yield Skipped(output="mesh checks", reason=UNCHECKED)

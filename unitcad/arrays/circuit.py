@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from dataclasses import replace as changed
 from functools import lru_cache
 from html import escape
+from importlib import import_module
 from itertools import chain, pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, OpType
@@ -23,7 +24,7 @@ from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.array_tables import CircuitTable
 from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.sheet import LENGTH, at_place
-from unitcad.arrays.tails import CLEAR
+from unitcad.arrays.tails import CLEAR, Strip
 from unitcad.designs import CIRCUIT_COLOUR, dimensions
 from unitcad.designs.limits import up
 from unitcad.errors import Missing, Refusal, missing_extra
@@ -40,15 +41,6 @@ LEAST_BEND = 10.0
 _EPS = 1e-6
 Line = tuple[float, tuple[float, ...]]
 """A row: its place across, and its units along it."""
-
-
-@dataclass(frozen=True)
-class Strip:
-    """A straight strip between two points of its middle line, with square ends; `half` of its width."""
-
-    start: Point
-    end: Point
-    half: float
 
 
 @dataclass(frozen=True)
@@ -149,23 +141,13 @@ def _ways(
 
 
 def _pads(array: Array, table: CircuitTable) -> tuple[list[CircuitPad], float, float]:
-    """Return the pads and the circuit's faces. Raises Refusal for units without a circuit, or with unlike ones."""
-    faces: set[tuple[float, float]] = set()
-    found = []
-    for place in array.places:
-        pad = dimensions(place.unit).pad
-        if pad is None:
-            raise Refusal("circuit", None, f"joins the circuits of the units, and {place.name} has none (fpcb)")
-        faces.add((pad.low, pad.high))
-        found.append(CircuitPad(place.name, place.x, place.y, pad.radius))
-    if len(faces) > 1:
-        raise Refusal("circuit", None, "one circuit is flat, and the units' motors or circuits differ in height")
-    narrowest = 2 * min(pad.radius for pad in found)
-    if table.row_width_mm > narrowest + _EPS:
-        limit = f"a row is no wider than the pads of {narrowest:g} mm"
-        raise Refusal("circuit.row_width_mm", table.row_width_mm, limit, narrowest)
-    low, high = faces.pop()
-    return found, low, high
+    """Return the pads and the circuit's faces; a back sheet's units are of one kind. Raises Refusal for wide rows."""
+    pad = dimensions(array.unit).pad
+    assert pad is not None  # `back_sheet.level` refuses units without a circuit
+    if table.row_width_mm > 2 * pad.radius + _EPS:
+        limit = f"a row is no wider than the pads of {2 * pad.radius:g} mm"
+        raise Refusal("circuit.row_width_mm", table.row_width_mm, limit, 2 * pad.radius)
+    return [CircuitPad(place.name, place.x, place.y, pad.radius) for place in array.places], pad.low, pad.high
 
 
 def _lines(pads: Sequence[CircuitPad], turned: bool) -> list[Line]:
@@ -253,6 +235,8 @@ def width_needed(motors: int) -> float:
 
 def crowded_tracks(array: Array) -> list[str]:
     """Return a sentence if spine and tail are too narrow for the tracks of all motors; otherwise []."""
+    if not has_circuit(array):
+        return []
     width, motors = (array.circuit or CircuitTable()).row_width_mm, len(array.places)
     needed = width_needed(motors)
     if needed <= width + 1e-9:
@@ -273,8 +257,6 @@ _LEAST_SIDES = 4
 """Sides of a polygon that are taken for an arc."""
 _KEPT_OFF = 0.01
 """Distance of inner corners from silicone, mm: more than the errors of polygons and meshes."""
-_TOGETHER = 32
-"""Runs of sides that are compared with arcs at once."""
 _LEAST_AREA = 1e-6
 """Of a corner that is not rounding's, mm2."""
 _MOST_TURN = math.radians(170)
@@ -287,43 +269,28 @@ def outline(array: Array, laid: Wiring | None = None) -> Profile:
     `laid` is the array's wiring, if it is known. Raises Refusal as `wiring`, and for corners that would enclose a
     hole or reach into a unit's silicone next to its notch.
     """
-    table = array.circuit or CircuitTable()
-    walls = tuple(
-        _Wall(
-            place.name,
-            (place.x, place.y),
-            dimensions(place.unit).cavity_radius - _KEPT_OFF,
-            place.radius + _KEPT_OFF,
-            place.unit.moulds.slot_width_clearance_mm / 2 - _KEPT_OFF,
-        )
-        for place in array.places
-    )
-    return _outline(laid or wiring(array), walls, table.corner_mm)
-
-
-class _Wall(NamedTuple):
-    """The silicone of a unit that corners keep off: its name and middle, two radii, a notch's play at a side, mm."""
-
-    name: str
-    at: tuple[float, float]
-    inner: float
-    outer: float
-    clearance: float
+    table, dims = array.circuit or CircuitTable(), dimensions(array.unit)
+    ring = dims.cavity_radius - _KEPT_OFF, array.places[0].radius + _KEPT_OFF
+    clearance = array.unit.moulds.slot_width_clearance_mm / 2 - _KEPT_OFF
+    return _outline(laid or wiring(array), ring, clearance, table.corner_mm)
 
 
 @lru_cache(maxsize=8)
-def _outline(laid: Wiring, walls: tuple[_Wall, ...], corner: float) -> Profile:
-    """Return the outline, kept: most changes of a sheet leave the circuit as it is. Raises Refusal."""
-    closed, blocked = _rounded(laid, walls, corner)
+def _outline(laid: Wiring, ring: tuple[float, float], clearance: float, corner: float) -> Profile:
+    """Return the outline, kept: most changes of a sheet leave the circuit as it is. Raises Refusal.
+
+    `ring`: radii of the silicone round each pad that corners keep off; `clearance`: a notch's play at a side, mm.
+    """
+    closed, blocked = _rounded(laid, ring, clearance, corner)
     if blocked:
         tenths = range(2, math.ceil(10 * corner))
         # A larger corner reaches into all that a smaller one does.
-        fits = bisect(tenths, False, key=lambda tenth: bool(_rounded(laid, walls, tenth / 10)[1]))
+        fits = bisect(tenths, False, key=lambda tenth: bool(_rounded(laid, ring, clearance, tenth / 10)[1]))
         raise Refusal("circuit.corner_mm", corner, blocked, tenths[fits - 1] / 10 if fits else None)
     return Profile(tuple(_with_arcs(_distinct(np.asarray(closed.to_polygons()[0], float)))))
 
 
-def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[CrossSection, str]:
+def _rounded(laid: Wiring, ring: tuple[float, float], clearance: float, corner: float) -> tuple[CrossSection, str]:
     """Return the circuit as a polygon with inner corners of a radius, and the objection to it, or ""."""
     discs = [CrossSection.circle(pad.radius, _segments(pad.radius)).translate((pad.x, pad.y)) for pad in laid.pads]
     joints = [CrossSection.circle(one.half, _segments(one.half)).translate(one.end) for one in laid.spine[:-1]]
@@ -334,23 +301,18 @@ def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[Cross
     if closed.num_contour() != 1:
         return closed, "the circuit's inner corners would enclose a hole between its rows or pads"
     added = closed - whole
-    # One union for all walls of a clearance, and of the additions only those near a wall: with all of it for each
-    # wall a large array took seconds.
+    # Of the additions only those near a unit: with all of them for each a large array took seconds.
     pieces = added.decompose()
     x0, y0, x1, y1 = np.array([piece.bounds() for piece in pieces], float).reshape(-1, 4).T
-    notches = {
-        clearance: CrossSection.batch_boolean([_rectangle(strip, clearance) for strip in laid.strips], OpType.Add)
-        for clearance in {wall.clearance for wall in walls}
-    }
-    for wall in walls:
-        (x, y), r = wall.at, wall.outer
+    notches = CrossSection.batch_boolean([_rectangle(strip, clearance) for strip in laid.strips], OpType.Add)
+    inner, r = ring
+    silicone = CrossSection.circle(r, 128) - CrossSection.circle(inner, 128)
+    for pad in laid.pads:
+        x, y = pad.x, pad.y
         near = np.flatnonzero((x0 < x + r) & (x1 > x - r) & (y0 < y + r) & (y1 > y - r))
-        silicone = CrossSection.circle(wall.outer, 128) - CrossSection.circle(wall.inner, 128)
-        beside = (CrossSection.compose([pieces[i] for i in near]) ^ silicone.translate(wall.at)) - notches[
-            wall.clearance
-        ]
+        beside = (CrossSection.compose([pieces[i] for i in near]) ^ silicone.translate((x, y))) - notches
         if beside.area() > _LEAST_AREA:
-            return closed, f"the circuit's inner corners would reach into the silicone of {wall.name} next to its notch"
+            return closed, f"the circuit's inner corners would reach into the silicone of {pad.name} next to its notch"
     return closed, ""
 
 
@@ -394,31 +356,20 @@ def _with_arcs(corners: np.ndarray) -> list[Vertex]:
     at = 0
     while at < n:
         end = min(int(long[np.searchsorted(long, at)]), at + _segments(math.inf) // 2)
-        end = at + _arc_sides(ring[at : end + 1])
-        if end - at >= _LEAST_SIDES:
-            found.append((float(ring[at, 0]), float(ring[at, 1]), math.tan(_turn(ring[at : end + 1]) / 4)))
-            at = end
-        else:
-            found.append((float(ring[at, 0]), float(ring[at, 1]), 0.0))
-            at += 1
+        count, turn = _arc(ring[at : end + 1])
+        count, bulge = (count, math.tan(turn / 4)) if count >= _LEAST_SIDES else (1, 0.0)
+        found.append((float(ring[at, 0]), float(ring[at, 1]), bulge))
+        at += count
     return found
 
 
-def _arc_sides(points: np.ndarray) -> int:
-    """Return the number of sides, from the first point on, that are on one arc of at most `_MOST_TURN`.
+def _arc(points: np.ndarray) -> tuple[int, float]:
+    """Return the number of sides, from the first point on, that are on one arc of at most `_MOST_TURN`, and its turn.
 
-    A single side, between two points, always does.
+    A single side, between two points, always is. The turn is positive to the left, from the angles that the chord is
+    seen under.
     """
-    for first in range(3, len(points) + 1, _TOGETHER):
-        counts = np.arange(first, min(first + _TOGETHER, len(points) + 1))
-        wrong = _off_arcs(points[: counts[-1]], counts)
-        if wrong.any():
-            return first + int(np.argmax(wrong)) - 2
-    return len(points) - 1
-
-
-def _off_arcs(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Tell for each of some counts whether the first so many points, three or more, are not on one arc."""
+    counts = np.arange(3, len(points) + 1)
     start, ends, middles = points[0], points[counts - 1], points[counts // 2]
     (ax, ay), (bx, by), (x, y) = (start - middles).T, (ends - middles).T, (ends - start).T
     seen, length = np.arctan2(ax * by - ay * bx, ax * bx + ay * by), np.hypot(x, y)
@@ -429,15 +380,9 @@ def _off_arcs(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
         middle_x, middle_y = (start[0] + ends[:, 0]) / 2 - y * away, (start[1] + ends[:, 1]) / 2 + x * away
         off = np.hypot(points[:, 0] - middle_x[:, None], points[:, 1] - middle_y[:, None]) - radius[:, None]
         near = (np.abs(off) < _OFF) | (np.arange(len(points)) >= counts[:, None])
-    return ~near.all(axis=1) | (np.abs(turn) > _MOST_TURN) | (np.abs(turn) < 1e-6)
-
-
-def _turn(points: np.ndarray) -> float:
-    """Return by how much an arc through points turns: left is positive, from the angles its chord is seen under."""
-    (x, y), (x0, y0), (x1, y1) = points[len(points) // 2].tolist(), points[0].tolist(), points[-1].tolist()
-    ax, ay, bx, by = x0 - x, y0 - y, x1 - x, y1 - y
-    seen = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    return -math.copysign(2 * (math.pi - abs(seen)), seen)
+    wrong = ~near.all(axis=1) | (np.abs(turn) > _MOST_TURN) | (np.abs(turn) < 1e-6)
+    sides = 1 + int(np.argmax([*wrong, True]))
+    return sides, float(turn[sides - 2]) if sides > 1 else 0.0
 
 
 def lay_circuit(array: Array) -> tuple[Body, ...]:
@@ -487,20 +432,16 @@ def circuit_svg(laid: Wiring, outline: Profile) -> str:
 def outline_path(outline: Profile) -> str:
     """Return an outline as the data of an SVG path, y downwards, to a micrometre."""
     first = outline.vertices[0]
-    drawn = [f"M{_um(first[0])} {_um(-first[1])}"]
+    drawn = [f"M{coord(first[0], 3)} {coord(-first[1], 3)}"]
     for start, end in sides(outline.vertices):
-        to = f"{_um(end[0])} {_um(-end[1])}"
+        to = f"{coord(end[0], 3)} {coord(-end[1], 3)}"
         if not start[2]:
             drawn.append(f"L{to}")
             continue
-        radius = _um(arc_centre(start[:2], end[:2], start[2])[2])
+        radius = coord(arc_centre(start[:2], end[:2], start[2])[2], 3)
         # More than half a turn has a bulge over 1; left turns run against SVG's sweep, whose y points down.
         drawn.append(f"A{radius} {radius} 0 {int(abs(start[2]) > 1)} {int(start[2] < 0)} {to}")
     return "".join([*drawn, "Z"])
-
-
-def _um(value: float) -> str:
-    return f"{round(value, 3) + 0.0:.3f}".rstrip("0").rstrip(".")
 
 
 _DIGITS = 6
@@ -511,7 +452,11 @@ _COLOURS = {"OUTLINE": 7, "PADS": 30, "NAMES": 8}
 
 def circuit_dxf(laid: Wiring, outline: Profile) -> bytes:
     """Return a DXF file (AC1024, AutoCAD 2010 and later). Raises Missing without ezdxf."""
-    ezdxf = _library()
+    try:
+        ezdxf: Any = import_module("ezdxf")
+        import_module("ezdxf.enums")
+    except ImportError as error:
+        raise missing_extra("dxf", "ezdxf is not installed; build without dxf, or install it") from error
     with _fixed_dates(ezdxf):
         document = ezdxf.new("R2010", units=4)  # millimetres
         document.header["$MEASUREMENT"] = 1
@@ -530,15 +475,6 @@ def circuit_dxf(laid: Wiring, outline: Profile) -> bytes:
         stream = io.StringIO()
         document.write(stream)
     return stream.getvalue().encode("utf-8")
-
-
-def _library() -> Any:
-    try:
-        import ezdxf
-        import ezdxf.enums
-    except ImportError as error:
-        raise missing_extra("dxf", "ezdxf is not installed; build without dxf, or install it") from error
-    return ezdxf
 
 
 @contextmanager
@@ -572,14 +508,14 @@ def kicad_board(laid: Wiring, outline: Profile) -> bytes:
     x0, _, _, y1 = outline.bounds
 
     def at(x: float, y: float) -> str:
-        return f"{_number(x - x0 + _CORNER_MM)} {_number(y1 - y + _CORNER_MM)}"
+        return f"{coord(x - x0 + _CORNER_MM, 6)} {coord(y1 - y + _CORNER_MM, 6)}"
 
     rows = [
         f"(kicad_pcb (version {_VERSION}) (generator unitcad)",
-        f"  (general (thickness {_number(laid.thickness)}))",
+        f"  (general (thickness {coord(laid.thickness, 6)}))",
         f'  (paper "{_paper(outline)}")',
         "  (layers",
-        *(f'    ({coord} "{name}" {kind})' for coord, name, kind in _LAYERS),
+        *(f'    ({number} "{name}" {kind})' for number, name, kind in _LAYERS),
         "  )",
         "  (setup (pad_to_mask_clearance 0))",
         '  (net 0 "")',
@@ -607,10 +543,6 @@ def _paper(outline: Profile) -> str:
     return next((name for name, across, down in sizes if wide <= across and high <= down), "A0")
 
 
-def _number(value: float) -> str:
-    return f"{value + 0.0:.6f}".rstrip("0").rstrip(".")
-
-
 def pad_table(array: Array, laid: Wiring) -> bytes:
     """Return a CSV file: a row for each motor's pad, in mm as in the array's frame, and one for the end of the tail.
 
@@ -619,19 +551,18 @@ def pad_table(array: Array, laid: Wiring) -> bytes:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("name", "what", "x_mm", "y_mm", "z_mm", "diameter_mm", "unit", "motor"))
+
+    def add(name: str, what: str, at: Point, wide: float, *more: str) -> None:
+        rows.writerow((name, what, *(coord(value, 4) for value in (*at, laid.low, wide)), *more))
+
     for pad, place in zip(laid.pads, array.places, strict=True):
-        at = (_mm(pad.x), _mm(pad.y), _mm(laid.low), _mm(2 * pad.radius))
-        rows.writerow((pad.name, "pad", *at, place.unit.name, motor.name if (motor := motor_of(place.unit)) else ""))
-    width = _mm(2 * laid.spine[-1].half)
-    rows.writerow(("tail", "end of the tail", _mm(laid.end[0]), _mm(laid.end[1]), _mm(laid.low), width, "", ""))
+        motor = motor_of(place.unit)
+        add(pad.name, "pad", (pad.x, pad.y), 2 * pad.radius, place.unit.name, motor.name if motor else "")
+    add("tail", "end of the tail", laid.end, 2 * laid.spine[-1].half, "", "")
     return text.getvalue().encode()
 
 
-def _mm(value: float) -> str:
-    return f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")
-
-
-DXF = "circuit.dxf"
+DXF, STEP = "circuit.dxf", "circuit.step"
 
 
 def has_circuit(array: Array) -> bool:
@@ -640,7 +571,7 @@ def has_circuit(array: Array) -> bool:
 
 
 def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Return the files by their names, and the reason for a missing one: DXF needs ezdxf.
+    """Return the files by their names, and the reason for a missing one: DXF needs ezdxf, STEP a kernel.
 
     Raises Refusal as `outline`.
     """
@@ -653,7 +584,16 @@ def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:
         "circuit.kicad_pcb": kicad_board(laid, drawn),
         "circuit-pads.csv": pad_table(array, laid),
     }
+    lacking: dict[str, str] = {}
     try:
-        return {**files, DXF: circuit_dxf(laid, drawn)}, {}
+        files[DXF] = circuit_dxf(laid, drawn)
     except Missing as missing:
-        return files, {DXF: str(missing)}
+        lacking[DXF] = str(missing)
+    if "step" in array.unit.output.formats:
+        try:
+            from unitcad.export.step import content
+
+            files[STEP] = content([circuit_body(array)], "circuit")
+        except Missing as missing:
+            lacking[STEP] = str(missing)
+    return files, lacking

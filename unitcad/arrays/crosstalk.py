@@ -7,8 +7,7 @@ import io
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from html import escape
 from itertools import groupby, pairwise
 from typing import Any
@@ -16,18 +15,21 @@ from typing import Any
 import numpy as np
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.circuit import circuit_body, circuit_files, has_circuit, outline, outline_path
+from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.attenuation.curve import RANGE, Reading, contact, decay, ends
-from unitcad.attenuation.inputs import Drive, EstimateInput, tissue_medium
+from unitcad.attenuation.inputs import Drive, tissue_medium
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
-from unitcad.errors import Missing, Refusal
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.export.chart import coord
 from unitcad.shape import Profile
 from unitcad.text import join_words, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
+DRIVES: tuple[Drive, ...] = ("flat", "axial")
+_SUMS = ("sum", "root_sum_of_squares")
+_ENDS = {"low": "p10", "high": "p90"}
 MOST_LOADED = 100
 """Units whose masses are taken into account at once."""
 DIGITS = 6
@@ -41,24 +43,13 @@ ASSUMPTIONS = [
 ]
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """Who drives whom in an array: distances along the skin (mm), shape (n, n), rows the unit that drives.
+def distances(array: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distances along the skin (mm, shape (n, n), rows the unit that drives): to the other unit's middle,
+    and to the point of its edge that is nearest.
 
-    `centre` is to the other unit's middle, `edge` to the point of its edge that is nearest. On a limb, x goes round it:
-    distances are those along the unrolled skin, the shorter way round, and shorter than on the flat sheet.
+    On a limb, x goes round it: distances are those along the unrolled skin, the shorter way round, and shorter than on
+    the flat sheet.
     """
-
-    centre: np.ndarray
-    edge: np.ndarray
-
-    @property
-    def count(self) -> int:
-        return len(self.centre)
-
-
-def pairs(array: Array) -> Pairs:
-    """Return the distances of an array's units."""
     at = np.array([(place.x, place.y) for place in array.places])
     radii = np.array([place.radius for place in array.places])
     across = np.abs(at[:, None] - at[None])
@@ -68,34 +59,25 @@ def pairs(array: Array) -> Pairs:
         half = math.pi * array.radius_mm
         across[..., 0] = np.abs((across[..., 0] + half) % (2 * half) - half)
     centre = np.hypot(across[..., 0], across[..., 1])
-    return Pairs(centre, np.maximum(centre - radii[None, :], radii[:, None]))
+    return centre, np.maximum(centre - radii[None, :], radii[:, None])
 
 
-@dataclass(frozen=True)
 class Decays:
-    """An array's units, their estimate's inputs, and the decays between them."""
+    """An array's units, the inputs of each distinct one's estimate, and the decays between them.
 
-    array: Array
+    `kind`: the number of each place's distinct unit; `centre`, `edge`: see `distances`. Raises Refusal for a unit
+    without an estimate, and for units on several tissues.
+    """
 
-    @cached_property
-    def inputs(self) -> tuple[EstimateInput, ...]:
-        """Of each distinct unit. Raises Refusal for a unit without an estimate."""
-        found = tuple(estimate_input(unit) for unit in self.array.units)
-        for one in found:
-            if one.tissue != found[0].tissue:
-                limit = f"units side by side are on one tissue, {found[0].tissue_name}"
-                raise Refusal("estimate.tissue", one.tissue_name, limit, found[0].tissue_name)
-        return found
-
-    @cached_property
-    def kind(self) -> np.ndarray:
-        """The number of each place's distinct unit, shape (n,)."""
-        return np.array([self.array.units.index(place.unit) for place in self.array.places])
-
-    @cached_property
-    def pairs(self) -> Pairs:
-        """The distances."""
-        return pairs(self.array)
+    def __init__(self, array: Array) -> None:
+        self.array, self.inputs = array, tuple(estimate_input(unit) for unit in array.units)
+        for one in self.inputs:
+            if one.tissue != self.inputs[0].tissue:
+                name = self.inputs[0].tissue_name
+                raise Refusal("estimate.tissue", one.tissue_name, f"units side by side are on one tissue, {name}", name)
+        self.kind = np.array([array.units.index(place.unit) for place in array.places])
+        self.drives = [self.inputs[kind].drive for kind in self.kind]
+        self.centre, self.edge = distances(array)
 
     def decays(
         self,
@@ -117,46 +99,38 @@ class Decays:
                 found[rows] = decay(one, 1e-3 * distances[rows], drive, hertz, end, reading)
         return found
 
-    def matrix(
-        self, distances: np.ndarray, drive: Drive, hertz: float | None = None, reading: Reading = "u"
-    ) -> np.ndarray:
-        """Return the decays at distances of shape (n, n) or (n, n, k), rows the unit that drives; 0 for itself."""
-        found = np.zeros(distances.shape)
-        drivers, moved = np.nonzero(~np.eye(self.pairs.count, dtype=bool))
-        found[drivers, moved] = self.decays(drivers, distances[drivers, moved], drive, hertz, reading=reading)
+    def both(self, drive: Drive, hertz: float | None = None, reading: Reading = "u") -> np.ndarray:
+        """Return the decays to the centre and to the nearest edge, shape (n, n, 2), rows the unit that drives.
+
+        0 for itself.
+        """
+        away = np.stack([self.centre, self.edge], axis=-1)
+        found = np.zeros(away.shape)
+        drivers, moved = np.nonzero(~np.eye(len(self.kind), dtype=bool))
+        found[drivers, moved] = self.decays(drivers, away[drivers, moved], drive, hertz, reading=reading)
         return found
 
-    def both(self, drive: Drive, hertz: float | None = None) -> np.ndarray:
-        """Return the matrices to the centre and to the nearest edge, shape (n, n, 2)."""
-        return self.matrix(np.stack([self.pairs.centre, self.pairs.edge], axis=-1), drive, hertz)
-
-
-@dataclass(frozen=True)
-class Told:
-    """The pairs that the answer is about: the nearest two units, and all others with the place that gets the most."""
-
-    units: Decays
-    nearest: tuple[int, int] | None
-    worst: int
-
-    def of(
-        self, drive: Drive | None = None, hertz: float | None = None, end: dict[str, int] | None = None
+    def answer(
+        self,
+        nearest: tuple[int, int] | None,
+        worst: int,
+        drive: Drive | None = None,
+        hertz: float | None = None,
+        end: dict[str, int] | None = None,
     ) -> dict[str, np.ndarray]:
-        """Return the nearest neighbour's decay to centre and edge, and the sums at the worst place.
+        """Return the decay between the `nearest` two units, to centre and edge, and the sums at the place `worst`.
 
         Each is (3,): of bare skin, and times the least and the largest factor of `contact`.
         """
-        if self.nearest is None:
+        if nearest is None:
             return dict.fromkeys(("nearest_centre", "nearest_edge", "sum", "root_sum_of_squares"), np.zeros(3))
-        pairs, (i, j) = self.units.pairs, self.nearest
-        others = np.delete(np.arange(pairs.count), self.worst)
-        distances = np.append(pairs.centre[others, self.worst], [pairs.centre[i, j], pairs.edge[i, j]])
-        drivers = np.append(others, [i, i])
-        found = self.units.decays(drivers, distances, drive, hertz, end)
-        own = [self.units.inputs[kind] for kind in self.units.kind[drivers]]
-        away = distances - [500.0 * one.diameter for one in own]
-        factors = np.array([contact(drive or one.drive, mm) for one, mm in zip(own, away, strict=True)]).T
-        found = found * np.concatenate([np.ones((1, found.size)), factors])
+        others = np.delete(np.arange(len(self.kind)), worst)
+        away = np.append(self.centre[others, worst], [self.centre[nearest], self.edge[nearest]])
+        drivers = np.append(others, [nearest[0], nearest[0]])
+        found = self.decays(drivers, away, drive, hertz, end)
+        own = [self.inputs[kind] for kind in self.kind[drivers]]
+        factors = [contact(drive or one.drive, mm - 500.0 * one.diameter) for one, mm in zip(own, away, strict=True)]
+        found = found * np.concatenate([np.ones((1, found.size)), np.array(factors).T])
         return {
             "nearest_centre": found[:, -2],
             "nearest_edge": found[:, -1],
@@ -179,21 +153,19 @@ def crosstalk(
     masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency out of range,
     and for masses of more than `MOST_LOADED` units.
     """
-    units = Decays(array)
-    n = len(array.places)
     say("crosstalk: decay")
-    matrices: dict[Drive, np.ndarray] = {"flat": units.both("flat"), "axial": units.both("axial")}
-    drives = [units.inputs[kind].drive for kind in units.kind]
-    own = np.array([matrices[drive][i] for i, drive in enumerate(drives)])
+    units, n = Decays(array), len(array.places)
+    matrices: dict[Drive, np.ndarray] = {drive: units.both(drive) for drive in DRIVES}
+    own = np.array([matrices[drive][i] for i, drive in enumerate(units.drives)])
     sums = {
         "own_drive": _sums(own[..., 0]),
         **{drive: _sums(one[..., 0]) for drive, one in matrices.items()},
-        "axial_u_z": _sums(units.matrix(units.pairs.centre, "axial", reading="u_z")),
+        "axial_u_z": _sums(units.both("axial", reading="u_z")[..., 0]),
     }
-    told = Told(units, _nearest(units, own), int(np.argmax(np.round(sums["own_drive"]["sum"], 9))))
+    nearest, worst = _nearest(units, own), int(np.argmax(np.round(sums["own_drive"]["sum"], 9)))
     say("crosstalk: range")
     varied = {str(end): end for one in units.inputs for end in ends(one)}.values()
-    answers = [told.of(), *(told.of(end=end) for end in varied)]
+    answers = [units.answer(nearest, worst, end=end) for end in (None, *varied)]
     ranged = {key: _quantity(np.array([one[key] for one in answers])) for key in answers[0]}
     names = [place.name for place in array.places]
     data: dict[str, Any] = {
@@ -210,23 +182,20 @@ def crosstalk(
                 "y_mm": place.y,
                 "unit": place.unit.name,
                 "diameter_mm": place.unit.diameter_mm,
-                "drive": drives[i],
+                "drive": units.drives[i],
                 "frequency_hz": units.inputs[units.kind[i]].frequency.middle,
             }
             for i, place in enumerate(array.places)
         ],
-        "nearest": told.nearest
+        "nearest": nearest
         and {
-            "from": names[told.nearest[0]],
-            "to": names[told.nearest[1]],
-            "distance_mm": round(float(units.pairs.centre[told.nearest]), DIGITS),
+            "from": names[nearest[0]],
+            "to": names[nearest[1]],
+            "distance_mm": round(float(units.centre[nearest]), DIGITS),
             "centre": ranged["nearest_centre"],
             "nearest_edge": ranged["nearest_edge"],
         },
-        "worst": {
-            "place": names[told.worst],
-            **{key: ranged[key] for key in ("sum", "root_sum_of_squares")},
-        },
+        "worst": {"place": names[worst], **{key: ranged[key] for key in _SUMS}},
         "sums": {name: {key: _rounded(one) for key, one in both.items()} for name, both in sums.items()},
         "matrix": {
             drive: {"centre": _table(one[..., 0]), "nearest_edge": _table(one[..., 1])}
@@ -239,13 +208,15 @@ def crosstalk(
         {
             "frequency_hz": hertz,
             **{
-                drive: {key: round(float(one[0]), DIGITS) for key, one in told.of(drive, hertz).items()}
-                for drive in matrices
+                drive: {
+                    key: round(float(one[0]), DIGITS) for key, one in units.answer(nearest, worst, drive, hertz).items()
+                }
+                for drive in DRIVES
             },
         }
         for hertz in band
     ]
-    data["absolute"] = _absolute(units, own[..., 0], told.worst, ranged)
+    data["absolute"] = _absolute(units, own[..., 0], worst, ranged)
     if masses:
         say("crosstalk: masses")
         data["masses"] = _masses(units)
@@ -258,16 +229,16 @@ def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _quantity(every: np.ndarray) -> dict[str, float]:
-    """Return a value with its range, of `Told.of` at the nominal tissue and at the ends, a row each."""
+    """Return a value with its range, of `Decays.answer` at the nominal tissue and at the ends, a row each."""
     ends = {"value": every[0, 0], "low": every[:, 1].min(), "high": every[:, 2].max()}
     return {key: round(float(one), DIGITS) for key, one in ends.items()}
 
 
 def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
     """Return the numbers of the two units nearest to each other, of several the loudest; None for a single unit."""
-    if units.pairs.count < 2:
+    if len(units.kind) < 2:
         return None
-    apart = np.where(np.eye(units.pairs.count, dtype=bool), np.inf, np.round(units.pairs.centre, 6))
+    apart = np.where(np.eye(len(units.kind), dtype=bool), np.inf, np.round(units.centre, 6))
     nearest = np.argwhere(apart == apart.min()).tolist()
     i, j = max(nearest, key=lambda pair: (round(float(own[pair[0], pair[1], 0]), 9), -pair[0], -pair[1]))
     return i, j
@@ -283,16 +254,18 @@ def _absolute(units: Decays, own: np.ndarray, worst: int, ranged: Mapping[str, M
         "place": units.array.places[worst].name,
         "unit": "of the motor's amplitude",
         "range": "80 % ranges of the levels at the edge, times the range of the decay",
-        **dict.fromkeys(("sum", "root_sum_of_squares")),
     }
     if any(one["p10"] is None for one in answers):
-        return {**block, "reason": "the level of a unit is not known"}
-    for end, point in (("low", "p10"), ("high", "p90")):
-        level = np.array([one[point] for one in answers])[units.kind]
-        for name, sums in _sums(own * level[:, None]).items():
-            part = ranged[name][end] / max(ranged[name]["value"], 1e-300)
-            block[name] = {**(block[name] or {}), end: round(float(sums[worst]) * part, DIGITS)}
-    return block
+        return {**block, **dict.fromkeys(_SUMS), "reason": "the level of a unit is not known"}
+    levels = {end: np.array([one[point] for one in answers])[units.kind] for end, point in _ENDS.items()}
+    at_ends = {end: _sums(own * level[:, None]) for end, level in levels.items()}
+    return block | {
+        name: {
+            end: round(float(sums[name][worst]) * (ranged[name][end] / max(ranged[name]["value"], 1e-300)), DIGITS)
+            for end, sums in at_ends.items()
+        }
+        for name in _SUMS
+    }
 
 
 def _masses(units: Decays) -> dict[str, Any]:
@@ -300,7 +273,7 @@ def _masses(units: Decays) -> dict[str, Any]:
 
     By the model of `attenuation.receivers`: every unit loads the skin under it, those between two others too.
     """
-    n = units.pairs.count
+    n = len(units.kind)
     if n > MOST_LOADED:
         raise Refusal("--masses", n, f"are worked out for at most {MOST_LOADED} units at once")
     frequencies = {one.frequency.middle for one in units.inputs}
@@ -316,8 +289,8 @@ def _masses(units: Decays) -> dict[str, Any]:
     ]
     g = influence(tissue_medium(units.inputs[0].tissue), patches, omega, rtol=1e-3)
     forces = np.zeros((n, 3, n), dtype=np.complex128)
-    for i, kind in enumerate(units.kind):
-        forces[i, :, i] = FORCES[units.inputs[kind].drive]
+    for i, drive in enumerate(units.drives):
+        forces[i, :, i] = FORCES[drive]
 
     def transfer(masses: np.ndarray) -> np.ndarray:
         size = np.linalg.norm(motion(g, masses, forces, omega), axis=1)  # (receiver, driver)
@@ -353,32 +326,28 @@ def _rounded(values: np.ndarray) -> list[float]:
     return [round(float(value), DIGITS) for value in values]
 
 
-DRIVES = ("flat", "axial")
-
-
-def crosstalk_csv(array: Array, band: Sequence[float] = BAND_HZ) -> bytes:
+def crosstalk_csv(array: Array) -> bytes:
     """Return a CSV file: `from` drives, `to` is moved; distances along the skin in mm, from the middle of `from`.
 
     The other columns are |u| over that at the edge of `from`, to the `centre` and the nearest `edge` of `to`, by drive,
-    at `frequency_hz` and then at each frequency of the band. Raises Refusal as `crosstalk_matrix.crosstalk`.
+    at `frequency_hz` and then at each frequency of the band. Raises Refusal as `crosstalk`.
     """
     units = Decays(array)
-    apart = ~np.eye(units.pairs.count, dtype=bool)
-    heads, columns = [], []
-    for hertz in (None, *band):
+    apart = ~np.eye(len(units.kind), dtype=bool)
+    table = {"distance_mm": np.round(units.centre[apart], 4), "edge_mm": np.round(units.edge[apart], 4)}
+    table["frequency_hz"] = np.array([one.frequency.middle for one in units.inputs])[units.kind[np.nonzero(apart)[0]]]
+    for hertz in (None, *BAND_HZ):
+        suffix = "" if hertz is None else f"_{hertz:g}hz"
         for drive in DRIVES:
-            both = units.both(drive, hertz)[apart]
-            suffix = "" if hertz is None else f"_{hertz:g}hz"
-            heads += [f"{drive}_centre{suffix}", f"{drive}_edge{suffix}"]
-            columns += [both[:, 0], both[:, 1]]
-    values = np.round(np.stack(columns, axis=1), DIGITS)
-    distances = np.round(np.stack([units.pairs.centre[apart], units.pairs.edge[apart]], axis=1), 4)
+            both = np.round(units.both(drive, hertz)[apart], DIGITS)
+            table |= {f"{drive}_centre{suffix}": both[:, 0], f"{drive}_edge{suffix}": both[:, 1]}
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(("from", "to", "distance_mm", "edge_mm", "frequency_hz", *heads))
+    rows.writerow(("from", "to", *table))
     names = [place.name for place in array.places]
-    for (i, j), away, of in zip(np.argwhere(apart).tolist(), distances.tolist(), values.tolist(), strict=True):
-        rows.writerow((names[i], names[j], *away, units.inputs[units.kind[i]].frequency.middle, *of))
+    columns = [column.tolist() for column in table.values()]
+    for (i, j), *values in zip(np.argwhere(apart).tolist(), *columns, strict=True):
+        rows.writerow((names[i], names[j], *values))
     return text.getvalue().encode()
 
 
@@ -429,19 +398,31 @@ def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
 
     In units' own levels at their edge. A ratio is None if one of the two is a single unit.
     """
-    first, found = every[0], []
-    for other in every[1:]:
-        block: dict[str, Any] = {"array": other["array"], "over": first["array"]}
-        both = first["nearest"], other["nearest"]
-        for key in ("centre", "nearest_edge"):
-            block[f"nearest_{key.removeprefix('nearest_')}"] = (
-                _over(both[1][key], both[0][key]) if both[0] and both[1] else None
-            )
-        for key in ("sum", "root_sum_of_squares"):
-            block[key] = _over(other["worst"][key], first["worst"][key])
-        block["same_tissue"] = first["tissue"] == other["tissue"]
-        found.append(block)
-    return found
+    first, *others = every
+    own = _quantities(first)
+    return [
+        {
+            "array": other["array"],
+            "over": first["array"],
+            **{key: _over(there, own[key]) for key, there in _quantities(other).items()},
+            "same_tissue": first["tissue"] == other["tissue"],
+        }
+        for other in others
+    ]
+
+
+def _quantities(data: Crosstalk) -> dict[str, Any]:
+    """Return what is compared of an array's crosstalk: the nearest neighbour, None of a single unit, and the sums."""
+    nearest = data["nearest"] or dict.fromkeys(("centre", "nearest_edge"))
+    return {
+        "nearest_centre": nearest["centre"],
+        "nearest_edge": nearest["nearest_edge"],
+        **{key: data["worst"][key] for key in _SUMS},
+    }
+
+
+def _over(one: Mapping[str, float] | None, other: Mapping[str, float] | None) -> float | None:
+    return round(one["value"] / other["value"], 6) if one and other and other["value"] else None
 
 
 def ratio_line(one: Mapping[str, Any]) -> str:
@@ -458,10 +439,6 @@ def ratio_line(one: Mapping[str, Any]) -> str:
     return (
         f"{one['array']} over {one['over']}: {said or 'nothing to compare'}{tissue}, in edge levels of their own units."
     )
-
-
-def _over(one: Mapping[str, float], other: Mapping[str, float]) -> float | None:
-    return round(one["value"] / other["value"], 6) if other["value"] else None
 
 
 def _percent(quantity: Mapping[str, float]) -> str:
@@ -492,17 +469,14 @@ def _band(data: Crosstalk) -> str:
     shares = [(row["frequency_hz"], row[drive]["nearest_centre"]) for row in data["band"]]
     ordered = sorted(shares, key=lambda pair: pair[1])
     least, most = ordered[0], ordered[-1]
-    falls = all(a[1] >= b[1] for a, b in pairwise(shares))
-    if falls and len(shares) > 1:
-        return (
-            f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz the nearest neighbour's share falls from "
-            f"{number(100 * most[1], 2)} to {number(100 * least[1], 2)} % ({drive} drive)."
-        )
-    return (
-        f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz the nearest neighbour's share is between "
-        f"{number(100 * least[1], 2)} % at {number(least[0])} Hz and {number(100 * most[1], 2)} % at "
-        f"{number(most[0])} Hz ({drive} drive)."
+    said = (
+        f"between {number(100 * least[1], 2)} % at {number(least[0])} Hz and {number(100 * most[1], 2)} % at "
+        f"{number(most[0])} Hz"
     )
+    falls = len(shares) > 1 and all(a[1] >= b[1] for a, b in pairwise(shares))
+    said = f"falls from {number(100 * most[1], 2)} to {number(100 * least[1], 2)} %" if falls else f"is {said}"
+    whole = f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz"
+    return f"{whole} the nearest neighbour's share {said} ({drive} drive)."
 
 
 STEPS = 21
@@ -517,23 +491,21 @@ _PAGE = 640.0
 _SCALE_PX = 90.0
 
 
-def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str = "centre") -> str:
-    """Return the matrix of `crosstalk_matrix.crosstalk` as an SVG document, in per cent.
+def heat_map_svg(data: Crosstalk, target: str = "centre") -> str:
+    """Return the matrix of `crosstalk` by each unit's own drive as an SVG document, in per cent.
 
-    A row is a unit that vibrates, a column one that it reaches. `drive`: else that of each row's own motor; `target`:
-    "centre" or "nearest_edge".
+    A row is a unit that vibrates, a column one that it reaches. `target`: "centre" or "nearest_edge".
     """
     places = data["places"]
     names = [place["name"] for place in places]
-    drives = [drive or place["drive"] for place in places]
-    matrix = [data["matrix"][of][target][i] for i, of in enumerate(drives)]
+    matrix = [data["matrix"][place["drive"]][target][i] for i, place in enumerate(places)]
     n = len(names)
     cell = min(56.0, max(2.0, _PAGE / n))
     left, top = (64.0, 74.0) if n <= _MOST_NAMES else (34.0, 60.0)
     high = _largest(value for row in matrix for value in row if value is not None)
     wide, tall = max(left + n * cell + _SCALE_PX, 470.0), top + n * cell + 20.0
     part = {"centre": "the middle", "nearest_edge": "the nearest edge"}[target]
-    driven = " and ".join(sorted(set(drives)))
+    driven = " and ".join(sorted({place["drive"] for place in places}))
     head = f"{data['array']}: how much of a unit's motion at its edge reaches {part} of another, % ({driven} drive)"
     parts = [_open(wide, tall), _text(8, 20, head, 12, "start")]
     parts += _cells(matrix, left, top, cell, high)
@@ -557,34 +529,28 @@ def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str 
     return "\n".join([*parts, "</svg>", ""])
 
 
-def patch_map_svg(
-    array: Array,
-    data: Mapping[str, Any] | None = None,
-    circuit: Profile | None = None,
-    key: str = "root_sum_of_squares",
-) -> str:
+def patch_map_svg(array: Array, data: Crosstalk, circuit: Profile | None = None) -> str:
     """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit if given.
 
-    With the `data` of `crosstalk_matrix.crosstalk` each unit is coloured by the amplitude that all others together give
-    it, in per cent of one unit's level at its edge; `key`: "root_sum_of_squares", or "sum" for the worst phases.
+    Each unit is coloured by the amplitude that all others together give it, the root of the sum of squares, in per cent
+    of one unit's level at its edge.
     """
-    drawn = array.sheet.outline if circuit is None else tuple(
+    x0, y0, x1, y1 = array.sheet.outline if circuit is None else tuple(
         pick(a, b) for pick, a, b in zip((min, min, max, max), array.sheet.outline, circuit.bounds, strict=True)
     )  # fmt: skip
-    scale = min(8.0, _PAGE / (drawn[2] - drawn[0]), _PAGE / (drawn[3] - drawn[1]))
+    scale = min(8.0, _PAGE / (x1 - x0), _PAGE / (y1 - y0))
     edge, top = 16.0, 44.0
-    wide = max((drawn[2] - drawn[0]) * scale + 2 * edge + (_SCALE_PX if data else 0.0), 470.0)
-    tall = (drawn[3] - drawn[1]) * scale + top + edge
-    values = data["sums"]["own_drive"][key] if data else None
-    high = _largest(values or ())
-    how = {"sum": "all in phase", "root_sum_of_squares": "root of the sum of squares"}[key]
-    head = [array.name]
-    if data:
-        head = [f"{array.name}: amplitude at each unit from all others", f"in % of one unit's edge level ({how})"]
-    wide = max(wide, *(_LETTER * 12 * len(line) + 16 for line in head))
+    values = data["sums"]["own_drive"]["root_sum_of_squares"]
+    high = _largest(values)
+    head = [
+        f"{array.name}: amplitude at each unit from all others",
+        "in % of one unit's edge level (root of the sum of squares)",
+    ]
+    wide = max(470.0, (x1 - x0) * scale + 2 * edge + _SCALE_PX, *(_LETTER * 12 * len(line) + 16 for line in head))
+    tall = (y1 - y0) * scale + top + edge
     parts = [_open(wide, tall), *(_text(8, 20 + 15 * i, line, 12, "start") for i, line in enumerate(head))]
     parts.append(
-        f'<g transform="translate({coord(edge - drawn[0] * scale)} {coord(top + drawn[3] * scale)}) '
+        f'<g transform="translate({coord(edge - x0 * scale)} {coord(top + y1 * scale)}) '
         f'scale({coord(scale)})" stroke-width="{0.8 / scale:.4f}">'
     )
     slots = "".join(outline_path(slot_profile(slot)) for slot in array.sheet.strap_slots)
@@ -592,26 +558,21 @@ def patch_map_svg(
     parts.append(
         f'<path d="{outer}{slots}" fill="#e4f2e4" stroke="#4f7f4f" fill-rule="evenodd"><title>sheet</title></path>'
     )
-    for i, place in enumerate(array.places):
-        fill = _colour(_share(values[i], high)) if values else "#ffffff"
-        title = place.name if values is None else f"{place.name}: {_map_percent(values[i])} %"
+    for place, value in zip(array.places, values, strict=True):
         parts.append(
-            f'<circle cx="{coord(place.x)}" cy="{coord(-place.y)}" r="{coord(place.radius)}" fill="{fill}" '
-            f'stroke="#33566e"><title>{escape(title)}</title></circle>'
+            f'<circle cx="{coord(place.x)}" cy="{coord(-place.y)}" r="{coord(place.radius)}" '
+            f'fill="{_colour(_share(value, high))}" '
+            f'stroke="#33566e"><title>{escape(f"{place.name}: {_map_percent(value)} %")}</title></circle>'
         )
     if circuit is not None:
         parts.append(f'<path d="{outline_path(circuit)}" fill="none" stroke="#a85a12"><title>circuit</title></path>')
     parts.append("</g>")
     size = min(13.0, 0.6 * min(place.radius for place in array.places) * scale)
-    for i, place in enumerate(array.places):
-        x = edge + (place.x - drawn[0]) * scale
-        y = top + (drawn[3] - place.y) * scale
-        fill = _ink(_share(values[i], high)) if values else _INK
-        parts.append(_text(x, y - (0.1 if values else -0.35) * size, place.name, size, "middle", fill))
-        if values:
-            parts.append(_text(x, y + 1.0 * size, _map_percent(values[i]), size, "middle", fill))
-    if values:
-        parts += _scale(wide - _SCALE_PX + 20, top, min(240.0, tall - top - edge), high)
+    for place, value in zip(array.places, values, strict=True):
+        x, y, fill = edge + (place.x - x0) * scale, top + (y1 - place.y) * scale, _ink(_share(value, high))
+        parts.append(_text(x, y - 0.1 * size, place.name, size, "middle", fill))
+        parts.append(_text(x, y + 1.0 * size, _map_percent(value), size, "middle", fill))
+    parts += _scale(wide - _SCALE_PX + 20, top, min(240.0, tall - top - edge), high)
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -687,28 +648,19 @@ def _map_percent(value: float) -> str:
     return f"{shown:.0f}" if shown >= 9.95 else number(shown, 2)
 
 
-JSON = "crosstalk.json"
+CROSSTALK = "crosstalk.json"
 
 
-def crosstalk_files(
-    array: Array, circuit: Profile | None = None, data: dict[str, Any] | None = None
-) -> dict[str, bytes]:
-    """Return the files by their names; `circuit` is drawn on the patch, `data` the result of `crosstalk`, if known.
-
-    Raises Refusal for units without an estimate.
-    """
-    data = data or crosstalk(array)
+def crosstalk_files(array: Array) -> dict[str, bytes]:
+    """Return the files by their names. Raises Refusal for units without an estimate."""
+    data, circuit = crosstalk(array), outline(array) if has_circuit(array) else None
     return {
-        JSON: (json.dumps(data, indent=1, allow_nan=False) + "\n").encode(),
+        CROSSTALK: (json.dumps(data, indent=1, allow_nan=False) + "\n").encode(),
         "crosstalk.csv": crosstalk_csv(array),
         "crosstalk.svg": heat_map_svg(data).encode(),
-        "crosstalk-edge.svg": heat_map_svg(data, target="nearest_edge").encode(),
+        "crosstalk-edge.svg": heat_map_svg(data, "nearest_edge").encode(),
         "crosstalk-patch.svg": patch_map_svg(array, data, circuit).encode(),
     }
-
-
-CROSSTALK = JSON
-STEP = "circuit.step"
 
 
 def extras(array: Array, only: Sequence[str]) -> tuple[dict[str, bytes], dict[str, str]]:
@@ -716,20 +668,10 @@ def extras(array: Array, only: Sequence[str]) -> tuple[dict[str, bytes], dict[st
 
     Raises Refusal for a circuit that does not fit.
     """
-    files: dict[str, bytes] = {}
-    lacking: dict[str, str] = {}
-    if "unit" in only:
-        files, lacking = circuit_files(array)
-        if files and "step" in array.unit.output.formats:
-            try:
-                from unitcad.export.step import content
-
-                files[STEP] = content([circuit_body(array)], "circuit")
-            except Missing as missing:
-                lacking[STEP] = str(missing)
+    files, lacking = circuit_files(array) if "unit" in only else ({}, {})
     if "estimate" in only:
         try:
-            files |= crosstalk_files(array, outline(array) if has_circuit(array) else None)
+            files |= crosstalk_files(array)
         except Refusal as refusal:
             lacking[CROSSTALK] = str(refusal)
     return files, lacking

@@ -15,7 +15,7 @@ from rich.text import Text
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions import construction_of
-from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, crosstalk, crosstalk_lines, ratio_line, ratios
+from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, DRIVES, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_command import assumed_line, to_open
 from unitcad.cli.output import console, print_json, progress
@@ -46,7 +46,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
-        yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
+        yield from json.loads(crosstalk.read_bytes())["answer"][:2]
     yield from to_open(folder)
 
 
@@ -114,15 +114,13 @@ def _print_details(data: Mapping[str, Any]) -> None:
 def _sums(data: Mapping[str, Any], names: Sequence[str]) -> Table:
     """Tabulate the amplitude at each unit from all others."""
     mixed = len({place["drive"] for place in data["places"]}) > 1
-    labels = {"own_drive": "own", "flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
-    labels = {key: label for key, label in labels.items() if mixed or key != "own_drive"}
-    table = Table("unit", title=f"sum of all other units there, times one unit's edge level: {_HOW}")
-    for label in labels.values():
-        table.add_column(f"{label}\nroot")
-        table.add_column(f"{label}\nsum")
+    labels = {"own_drive": "own"} if mixed else {}
+    labels |= {"flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
+    heads = [f"{label}\n{head}" for label in labels.values() for head in ("root", "sum")]
+    table = Table("unit", *heads, title=f"sum of all other units there, times one unit's edge level: {_HOW}")
     for i, name in enumerate(names):
-        cells = [number(data["sums"][key][kind][i], 2) for key in labels for kind in ("root_sum_of_squares", "sum")]
-        table.add_row(name, *cells)
+        cells = [data["sums"][key][kind][i] for key in labels for kind in ("root_sum_of_squares", "sum")]
+        table.add_row(name, *(number(cell, 2) for cell in cells))
     return table
 
 
@@ -137,15 +135,11 @@ def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> Table:
 
 def _band(data: Mapping[str, Any]) -> Table:
     """Tabulate the nearest neighbour and the worst place over the band."""
-    table = Table("Hz", title=f"nearest neighbour, %; amplitude at {data['worst']['place']} from all others: {_HOW}")
-    for drive in ("flat", "axial"):
-        for head in ("middle", "edge", "root", "sum"):
-            table.add_column(f"{drive}\n{head}")
+    heads = [f"{drive}\n{head}" for drive in DRIVES for head in ("middle", "edge", "root", "sum")]
+    title = f"nearest neighbour, %; amplitude at {data['worst']['place']} from all others: {_HOW}"
+    table = Table("Hz", *heads, title=title)
+    scales = {"nearest_centre": 100, "nearest_edge": 100, "root_sum_of_squares": 1, "sum": 1}
     for row in data["band"]:
-        cells = []
-        for drive in ("flat", "axial"):
-            one = row[drive]
-            cells += [number(100 * one[key], 2) for key in ("nearest_centre", "nearest_edge")]
-            cells += [number(one[key], 2) for key in ("root_sum_of_squares", "sum")]
+        cells = [number(by * row[drive][key], 2) for drive in DRIVES for key, by in scales.items()]
         table.add_row(f"{row['frequency_hz']:g}", *cells)
     return table

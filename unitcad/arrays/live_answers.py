@@ -10,13 +10,13 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from unitcad.arrays.array import Array
+from unitcad.arrays.array import Array, units_in
 from unitcad.arrays.array_file import array_of, expand, makeable_array, sound_array, to_toml
 from unitcad.arrays.array_page import patch_model, tools_model
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
 from unitcad.arrays.arrayed import unit_folders
-from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines, heat_map_svg, patch_map_svg
+from unitcad.arrays.crosstalk import crosstalk, heat_map_svg, patch_map_svg
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
@@ -30,6 +30,7 @@ from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import unit_procedure
 from unitcad.spec.custom_code import files_named
+from unitcad.spec.raw import Table
 from unitcad.spec.toml import from_json, line_of, to_json
 from unitcad.validation import templates
 from unitcad.validation.plain_data import at
@@ -80,11 +81,7 @@ def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]
 def named_files(data: Mapping[str, Any]) -> dict[str, str]:
     """Return the values of an array's plain data that name files, by their paths; a shipped unit's name is none."""
     found = files_named({key: value for key, value in data.items() if key != "design"})
-    places = data.get("place")
-    units = {"unit": data.get("unit")}
-    for i, place in enumerate(places if isinstance(places, list) else ()):
-        units[f"place.{i}.unit"] = place.get("unit") if isinstance(place, dict) else None
-    for field, unit in units.items():
+    for field, unit in units_in(data).items():
         own = unit if isinstance(unit, dict) else {}
         like = own.get("like") if own else unit
         if isinstance(like, str) and like not in templates():
@@ -95,11 +92,7 @@ def named_files(data: Mapping[str, Any]) -> dict[str, str]:
 
 def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each unit's plain data, with the field of its design. Raises Refusal for a unit that is not found."""
-    whole = expand(data, folder)
-    places = whole.get("place")
-    found = {"unit": whole.get("unit")}
-    for i, place in enumerate(places if isinstance(places, list) else ()):
-        found[f"place.{i}.unit"] = place.get("unit") if isinstance(place, dict) else None
+    found = units_in(expand(data, folder))
     yield from ((f"{field}.design", unit) for field, unit in found.items() if isinstance(unit, dict))
 
 
@@ -122,29 +115,27 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
         "layout.kind": [(name, kind.about) for name, kind in layouts().items()],
         "unit": [(name, "") for name in templates()],
     }
-    kind = at(data, "layout.kind")
-    table = layouts()[kind].table if isinstance(kind, str) and kind in layouts() else None
-    unit = data.get("unit")
-    first = [*fields(AskedArray, "", data, holds, choices, ("name", "array"))]
+
+    def rows(table: type[Table], path: str, *keys: tuple[str, ...]) -> list[Field]:
+        return [*fields(table, path, data, holds, choices, *keys)]
+
+    kind = layouts().get(str(at(data, "layout.kind")))
+    unit, there = data.get("unit"), isinstance(data.get("circuit"), dict)
+    made = [Group("", "Array", rows(AskedArray, "", ("name", "array")))]
     if isinstance(unit, str):
-        first.append(Field("unit", "unit", "word", unit, given=True, required=True, choices=choices["unit"]))
-    made = [Group("", "Array", first)]
-    if table is not None:
-        made.append(Group("layout", "Layout", [*_with_kinds(fields(table, "layout", data, holds, choices), choices)]))
-    made.append(Group("sheet", "Sheet", [*fields(SheetTable, "sheet", data, holds, choices)]))
-    made.append(Group("limb", "Limb", [*fields(LimbTable, "limb", data, holds, choices)]))
-    there = isinstance(data.get("circuit"), dict)
-    rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
-    made.append(Group("circuit", "Common circuit", rows, there, optional=True))
+        field = Field("unit", "unit", "word", unit, given=True, required=True, choices=choices["unit"])
+        made[0].fields.append(field)
+    if kind is not None:
+        # Its kind may be any of the kinds.
+        known = {"kind": "word", "required": True, "choices": choices["layout.kind"]}
+        of_kind = [replace(row, **known) if row.path == "layout.kind" else row for row in rows(kind.table, "layout")]
+        made.append(Group("layout", "Layout", of_kind))
+    made.append(Group("sheet", "Sheet", rows(SheetTable, "sheet")))
+    made.append(Group("limb", "Limb", rows(LimbTable, "limb")))
+    circuit = rows(CircuitTable, "circuit") if there else []
+    made.append(Group("circuit", "Common circuit", circuit, there, optional=True))
     # The unit has the keys that the array's tables lack.
     return [*made, *table_groups(LAST_TABLES, data, array.asked["unit"] if array else {}, choices)]
-
-
-def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str]]]) -> Iterator[Field]:
-    """Yield a layout's fields; its kind may be any of the kinds."""
-    for row in rows:
-        known = row.path == "layout.kind"
-        yield replace(row, kind="word", required=True, choices=choices[row.path]) if known else row
 
 
 def _patch(array: Array, answer: Answer) -> None:
@@ -183,7 +174,7 @@ def _cast(unit: str) -> Procedure:
 
 def _crosstalk(array: Array, answer: Answer) -> None:
     data = crosstalk(array)
-    answer.lines = crosstalk_lines(data)
+    answer.lines = data["answer"]
     answer.drawings = [
         ("Vibration at each unit from all others, on the patch", patch_map_svg(array, data)),
         ("Crosstalk from each unit (row) to each other one (column)", heat_map_svg(data)),

@@ -18,6 +18,7 @@ from unitcad.validation.suggestions import (
     good_numbers,
     is_number,
     nearest_number,
+    numbers,
     write_changes,
 )
 
@@ -51,8 +52,11 @@ def suggest_for_array(refusal: Refusal, data: Mapping[str, Any], judge: Judge, s
         return refusal
     judge = _patient(judge)
     field, limit = refusal.field, refusal.limit
-    if field.endswith(_OF_TAIL) and (wider := _wider(_present_pitches(data), data, judge)):
-        limit += f"; with {write_changes(wider, 'and')} it is accepted as it is"
+    if field.endswith(_OF_TAIL):
+        pitch = at(data, _PITCH)
+        present = {_PITCH: pitch} if is_number(pitch) else dict(numbers(pitch, _PITCH))
+        if wider := _wider(present, data, judge):
+            limit += f"; with {write_changes(wider, 'and')} it is accepted as it is"
     changes, met = follow(refusal, data, judge)
     if isinstance(refusal.nearest, str) and changes.get(field) not in (None, refusal.nearest):
         own = [one.limit for one in met if one.field == field]
@@ -105,13 +109,6 @@ def _patient(judge: Judge) -> Judge:
     return judged
 
 
-def _present_pitches(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the pitch by its path, or both of a grid's; {} if the layout has none."""
-    pitch = at(data, _PITCH)
-    both = {f"{_PITCH}.{axis}": mm for axis, mm in enumerate(pitch)} if isinstance(pitch, list | tuple) else {}
-    return {_PITCH: pitch} if isinstance(pitch, int | float) else both
-
-
 def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judge) -> object:
     """Return a bed that is accepted and smaller than the one that was found, if tries between find one."""
     low, high, same = float(str(refusal.value)), float(nearest), 0
@@ -158,17 +155,13 @@ def _wider(pitches: Mapping[str, Any], data: Mapping[str, Any], judge: Judge) ->
     return {}
 
 
-def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judge: Judge) -> Refusal:
-    """Return the refusal of a bed or a circuit, its limit naming pitch, strap slot or fewer units that fit.
-
-    `places`: the array's number of them.
-    """
-    bed = refusal.field.startswith(_OF_BED)
+def with_other_ways(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
+    """Return the refusal of a bed or a circuit, its limit naming pitch, strap slot or fewer units that fit."""
+    bed, circuit = (refusal.field.startswith(table) for table in (_OF_BED, _OF_CIRCUIT))
     found: dict[str, object] = {}
-    if places <= _MANY and (bed or refusal.field.startswith(_OF_CIRCUIT)):
+    if (bed or circuit) and _places(data) <= _MANY:
         found = next((each for each in _pitches(refusal, data) if find_refusal(data, each, judge) is None), {})
-    if places <= _MANY and bed:
-        found |= _shorter_slot(data, judge)
+        found |= _shorter_slot(data, judge) if bed else {}
     word = "or"
     if bed and not found:
         found, word = _fewer(refusal, data, judge), "and"

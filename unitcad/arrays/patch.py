@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 from typing import NamedTuple
 
 from manifold3d import Manifold
@@ -156,13 +155,7 @@ class PatchMoulds(MouldSet):
         """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
         if self.construction.own_tails:
             return ()
-        array, motors = self.arranged, [body for body in unit_bodies(self.arranged.unit) if body.kind == "motor"]
-        placed = [
-            replace(body, name=f"{p.name}-{body.name}", shape=at_place(array, body.shape, p))
-            for p in array.places
-            for body in motors
-        ]
-        return (*placed, *lay_circuit(array))
+        return tuple(body for body in patch_bodies(self.arranged) if body.kind in ("motor", "circuit"))
 
     @cached_property
     def pushed_in(self) -> tuple[Body, ...]:
@@ -214,14 +207,10 @@ class PatchMoulds(MouldSet):
         if self.arranged.cast == "curved":
             along, radius = y1 - y0, self.arranged.radius_mm or 0.0
             return f"The sheet: {along:.2f} mm along the limb. Every unit sits on a tube of radius {radius:.2f} mm."
-        middles = f" Between the middles of neighbouring units: {pitch:.2f} mm." if (pitch := self._pitch) else ""
+        middles = ""
+        if len(self.arranged.places) > 1:
+            middles = f" Between the middles of neighbouring units: {self.arranged.pitch_mm:.2f} mm."
         return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
-
-    @property
-    def _pitch(self) -> float:
-        """The least distance between two units' middles, mm; 0 of a single one."""
-        places = self.arranged.places
-        return min((math.dist((p.x, p.y), (q.x, q.y)) for p, q in combinations(places, 2)), default=0.0)
 
     @property
     def poured_across(self) -> tuple[str, float]:
@@ -255,9 +244,9 @@ class PatchMoulds(MouldSet):
         try:
             return plan_tools(self.arranged)
         except Refusal as refusal:
-            asked, places = self.arranged.asked, len(self.arranged.places)
+            asked = self.arranged.asked
             better = suggest_for_array(refusal, asked, makeable_array, sound_array(asked))
-            raise with_other_ways(better, asked, places, makeable_array) from None
+            raise with_other_ways(better, asked, makeable_array) from None
 
     @cached_property
     def dimensions(self) -> Dimensions:
@@ -272,8 +261,6 @@ class PatchMoulds(MouldSet):
     @cached_property
     def rib_spaces(self) -> Manifold:
         """Empty: no cup of a patch is centred by ribs on a plinth."""
-        from manifold3d import Manifold
-
         return Manifold()
 
 
@@ -289,4 +276,6 @@ def patch_spec(array: Array) -> Spec:
     if not way.own_tails:
         layers = (*unit.layers[:-1], structs.replace(unit.layers[-1], material=array.sheet.material))
     entries = {name: entry for each in array.units for name, entry in each.materials.items()}
-    return structs.replace(unit, name=array.name, layers=layers, fpcb=None, wires=None, materials=entries)
+    moulds = structs.replace(unit.moulds, pour="open")  # units in pockets may be injected, their sheet is struck off
+    own = {"name": array.name, "layers": layers, "materials": entries, "moulds": moulds}
+    return structs.replace(unit, fpcb=None, wires=None, **own)

@@ -114,11 +114,9 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     elif table.hold_mm is not None:
         raise Refusal("sheet.hold_mm", table.hold_mm, f"{asked.array} has no pockets for units: leave it out")
     margin = table.margin_mm
-    radii = [unit.diameter_mm / 2 for unit in units]
-    x0 = min(p.x - r for p, r in zip(points, radii, strict=True)) - margin
-    x1 = max(p.x + r for p, r in zip(points, radii, strict=True)) + margin
-    y0 = min(p.y - r for p, r in zip(points, radii, strict=True)) - margin
-    y1 = max(p.y + r for p, r in zip(points, radii, strict=True)) + margin
+    at, radii = np.array([(p.x, p.y) for p in points]), np.array([unit.diameter_mm / 2 for unit in units])
+    x0, y0 = ((at - radii[:, None]).min(axis=0) - margin).tolist()
+    x1, y1 = ((at + radii[:, None]).max(axis=0) + margin).tolist()
     slots: tuple[Box, ...] = ()
     if table.strap_slot_mm:
         width, length = table.strap_slot_mm
@@ -142,7 +140,7 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
         low=mm(level.low),
         high=mm(level.high),
         margin_mm=margin,
-        corner_mm=_corner(table.corner_mm, min(radii) + margin, outline, slots),
+        corner_mm=_corner(table.corner_mm, float(radii.min()) + margin, outline, slots),
         outline=outline,
         strap_slots=slots,
         hold_mm=hold,

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
 
-from unitcad.arrays.array import Array, Box, Placed, Sheet
+from unitcad.arrays.array import Array, Placed, Sheet
 from unitcad.arrays.constructions import construction_of
-from unitcad.arrays.layouts import Point
 from unitcad.designs import dimensions
 from unitcad.designs.dimensions import WIRE_GAP
 from unitcad.designs.limits import EPS
-from unitcad.geometry.segments import between_segments, to_box, to_segment
+from unitcad.geometry.segments import Point, between_segments, to_box, to_segment
 from unitcad.spec import Spec
 from unitcad.text import join_words, number
 
@@ -23,15 +22,12 @@ CLEAR = 0.5
 STEP_DEG = 15
 
 
-class Tail(NamedTuple):
-    """A straight strip from (x0, y0) to (x1, y1), mm, of half the width `half`; `owner` is its unit's number."""
+class Strip(NamedTuple):
+    """A straight strip between two points of its middle line, with square ends; `half` of its width, mm."""
 
-    x0: float
-    y0: float
-    x1: float
-    y1: float
+    start: Point
+    end: Point
     half: float
-    owner: int
 
 
 class Blocked(Exception):
@@ -45,14 +41,15 @@ class Blocked(Exception):
         self.owner, self.longest, self.by, self.turned = owner, longest, by, turned
 
 
-def tails(unit: Spec, x: float, y: float, angle_deg: float, owner: int, length: float | None = None) -> list[Tail]:
-    """Return the tails of a unit at its place; `length` in place of its own, mm beyond its edge."""
-    dims, half = dimensions(unit), tail_half_width(unit)
-    reach = dims.outer_radius + (tail_length(unit) if length is None else length)
+def tails(place: Placed, angle_deg: float, length: float | None = None) -> list[Strip]:
+    """Return a unit's tails at an angle; `length` in place of its own, mm beyond its edge."""
+    dims, half = dimensions(place.unit), tail_half_width(place.unit)
+    reach = dims.outer_radius + (tail_length(place.unit) if length is None else length)
     found = []
     for side in dims.sides if half else ():
         turn = math.radians(angle_deg + (0 if side > 0 else 180))
-        found.append(Tail(x, y, x + reach * math.cos(turn), y + reach * math.sin(turn), half, owner))
+        end = place.x + reach * math.cos(turn), place.y + reach * math.sin(turn)
+        found.append(Strip((place.x, place.y), end, half))
     return found
 
 
@@ -68,70 +65,99 @@ def tail_length(unit: Spec) -> float:
     return unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
 
 
-def angles(points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], sheet: Sheet) -> list[float]:
-    """Return each unit's angle, degrees: the `asked` one, by its number, or the nearest free way.
+def length_field(unit: Spec) -> str:
+    """Return the spec's key of that length."""
+    return "fpcb.tail_length_mm" if unit.fpcb else "wires.length_mm"
+
+
+class Ways:
+    """The places of units, the tails that are laid there so far, and for each place those that its tail could meet."""
+
+    def __init__(self, places: Sequence[Placed], sheet: Sheet, laid: list[list[Strip]]) -> None:
+        self.places, self.sheet, self.laid = places, sheet, laid
+        self.near: dict[int, Sequence[int]] = {}
+
+    def blocked(self, i: int, angle: float, length: float | None = None) -> str:
+        """Return the obstacle of a unit's tails at an angle; "" for none."""
+        for tail in tails(self.places[i], angle, length):
+            near = [self.places[j] for j in self.near[i]]
+            for place in near:
+                if to_segment((place.x, place.y), tail.start, tail.end) < place.radius + tail.half + CLEAR - 1e-9:
+                    return f"the unit {place.name}"
+            for j in self.near[i]:
+                for other in self.laid[j]:
+                    apart = between_segments(tail.start, tail.end, other.start, other.end)
+                    if apart < tail.half + other.half + CLEAR - 1e-9:
+                        return f"the tail of {self.places[j].name}"
+            for slot in self.sheet.strap_slots:
+                if to_box(tail.start, tail.end, slot) < tail.half + CLEAR - 1e-9:
+                    return "a strap slot"
+        return ""
+
+    def covered(self, i: int, angle: float) -> bool:
+        """Tell whether a unit's tails at an angle end under the sheet."""
+        exit = dimensions(self.places[i].unit).exit
+        if exit is None or exit.high > self.sheet.low + EPS:
+            return False  # the tail is on the sheet
+        return any(_is_covered(tail, self.sheet, EPS) for tail in tails(self.places[i], angle))
+
+    def longest(self, i: int, tried: Sequence[float]) -> float:
+        """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 if none does."""
+        low, high = 0, int(tail_length(self.places[i].unit) * 10)
+        while low < high:
+            middle = (low + high + 1) // 2
+            fits = any(not self.blocked(i, angle, middle / 10) for angle in tried)
+            low, high = (middle, high) if fits else (low, middle - 1)
+        return low / 10
+
+
+def angles(places: Sequence[Placed], asked: Collection[int], sheet: Sheet) -> list[float]:
+    """Return each unit's angle, degrees: its own if it is `asked` for by its number, or the nearest free way.
 
     Raises Blocked for the first unit whose tail finds none.
     """
     try:
-        return _laid(points, units, asked, sheet, out=True)
+        return _laid(places, asked, sheet, out=True)
     except Blocked:
         # A tail that was turned to come out may block another.
-        return _laid(points, units, asked, sheet, out=False)
+        return _laid(places, asked, sheet, out=False)
 
 
-def _laid(
-    points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], sheet: Sheet, *, out: bool
-) -> list[float]:
+def _laid(places: Sequence[Placed], asked: Collection[int], sheet: Sheet, *, out: bool) -> list[float]:
     """Return the angles; with `out` a quarter turn whose tail comes out from under the sheet is preferred."""
-    radii = [unit.diameter_mm / 2 for unit in units]
-    near = _neighbours(points, units, radii)
-    laid: list[list[Tail]] = [[] for _ in points]
-    chosen = [asked.get(i, 0.0) for i in range(len(points))]
-    slots = sheet.strap_slots
+    chosen = [place.angle_deg for place in places]
+    ways = Ways(places, sheet, [tails(place, place.angle_deg) if i in asked else [] for i, place in enumerate(places)])
+    reach = max(place.radius + tail_length(place.unit) for place in places)
+    far = 2 * reach + 2 * max(tail_half_width(place.unit) for place in places) + CLEAR
+    for i, p in enumerate(places):
+        ways.near[i] = [j for j, q in enumerate(places) if j != i and abs(q.x - p.x) <= far and abs(q.y - p.y) <= far]
     for i in asked:
-        laid[i] = tails(units[i], points[i].x, points[i].y, chosen[i], i)
-    for i in asked:
-        if why := in_the_way(laid[i], i, points, radii, near[i], laid, slots):
-            longest = _longest(i, (chosen[i],), points, units, radii, near[i], laid, slots)
-
-            def clear(angle: float, i: int = i) -> bool:
-                drawn = tails(units[i], points[i].x, points[i].y, angle, i)
-                return not in_the_way(drawn, i, points, radii, near[i], laid, slots)
-
+        if why := ways.blocked(i, chosen[i]):
             by = (chosen[i] + sign * turn for turn in range(1, 181) for sign in (1, -1))
-            raise Blocked(i, longest, why, next((angle for angle in by if abs(angle) <= 360 and clear(angle)), None))
-    for i in (i for i in range(len(points)) if i not in asked):
+            turned = next((angle for angle in by if abs(angle) <= 360 and not ways.blocked(i, angle)), None)
+            raise Blocked(i, ways.longest(i, (chosen[i],)), why, turned)
+    for i, place in enumerate(places):
+        if i in asked:
+            continue
         why, free = "", None
-        for angle in candidates(points[i]):
+        for angle in candidates(place):
             if free is not None and angle % 90:
                 break
-            drawn = tails(units[i], points[i].x, points[i].y, angle, i)
-            why = in_the_way(drawn, i, points, radii, near[i], laid, slots)
-            if not why and (free is None or not ends_covered(units[i], drawn, sheet)):
-                free = angle, drawn
-                if not (out and ends_covered(units[i], drawn, sheet)):
+            why = ways.blocked(i, angle)
+            covered = out and ways.covered(i, angle)
+            if not why and (free is None or not covered):
+                free = angle
+                if not covered:
                     break
         if free is None:
-            longest = _longest(i, candidates(points[i]), points, units, radii, near[i], laid, slots)
-            raise Blocked(i, longest, why)
-        chosen[i], laid[i] = free
+            raise Blocked(i, ways.longest(i, candidates(place)), why)
+        chosen[i], ways.laid[i] = free, tails(place, free)
     return chosen
 
 
-def _neighbours(points: Sequence[Point], units: Sequence[Spec], radii: Sequence[float]) -> list[list[int]]:
-    """Return for each unit the numbers of those that its tail, or a tail of theirs, could meet."""
-    reach = [radius + tail_length(unit) for unit, radius in zip(units, radii, strict=True)]
-    far = 2 * max(reach) + 2 * max(tail_half_width(unit) for unit in units) + CLEAR
-    return [
-        [j for j, q in enumerate(points) if j != i and abs(q.x - p.x) <= far and abs(q.y - p.y) <= far]
-        for i, p in enumerate(points)
-    ]
-
-
-def candidates(point: Point) -> list[float]:
+def candidates(place: Placed) -> list[float]:
     """Return the angles to try, degrees: quarter turns first, each group from the way outwards on."""
-    outwards = math.degrees(math.atan2(point.y, point.x)) if math.hypot(point.x, point.y) > 1e-6 else 0.0
+    outwards = math.degrees(math.atan2(place.y, place.x)) if math.hypot(place.x, place.y) > 1e-6 else 0.0
 
     def away(angle: float) -> float:
         return round(abs((angle - outwards + 180) % 360 - 180), 6)
@@ -140,102 +166,28 @@ def candidates(point: Point) -> list[float]:
     return sorted(every, key=lambda angle: (angle % 90 != 0, angle % 45 != 0, away(angle), angle))
 
 
-def in_the_way(
-    drawn: Sequence[Tail],
-    owner: int,
-    points: Sequence[Point],
-    radii: Sequence[float],
-    near: Sequence[int],
-    laid: Sequence[Sequence[Tail]],
-    slots: Sequence[Box],
-) -> str:
-    """Return the obstacle of a unit's tails; "" for none."""
-    for tail in drawn:
-        start, end = (tail.x0, tail.y0), (tail.x1, tail.y1)
-        for j in near:
-            if to_segment((points[j].x, points[j].y), start, end) < radii[j] + tail.half + CLEAR - 1e-9:
-                return f"the unit {points[j].name}"
-        for j in near:
-            for other in laid[j]:
-                apart = between_segments(start, end, (other.x0, other.y0), (other.x1, other.y1))
-                if apart < tail.half + other.half + CLEAR - 1e-9:
-                    return f"the tail of {points[j].name}"
-        for slot in slots:
-            if to_box(start, end, slot) < tail.half + CLEAR - 1e-9:
-                return "a strap slot"
-    return ""
-
-
-def _longest(
-    owner: int,
-    tried: Sequence[float],
-    points: Sequence[Point],
-    units: Sequence[Spec],
-    radii: Sequence[float],
-    near: Sequence[int],
-    laid: Sequence[Sequence[Tail]],
-    slots: Sequence[Box],
-) -> float:
-    """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 if none does."""
-    free = [tails_of if j != owner else [] for j, tails_of in enumerate(laid)]
-
-    def fits(tenths: int) -> bool:
-        return any(
-            not in_the_way(
-                tails(units[owner], points[owner].x, points[owner].y, angle, owner, tenths / 10),
-                owner, points, radii, near, free, slots,
-            )
-            for angle in tried
-        )  # fmt: skip
-
-    low, high = 0, int(tail_length(units[owner]) * 10)
-    while low < high:
-        middle = (low + high + 1) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle - 1)
-    return low / 10
-
-
-def ends_covered(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
-    """Tell whether a unit's tails end under the sheet."""
-    exit = dimensions(unit).exit
-    if exit is None or exit.high > sheet.low + EPS:
-        return False  # the tail is on the sheet
-    return any(_way_out(start, along, sheet, EPS) > 0 for tail in drawn for start, along in _end(tail))
-
-
-def to_edge(drawn: Sequence[Tail], sheet: Sheet) -> float:
-    """Return how far tails have to go on until all of their width is out of the sheet's outline, mm."""
-    return max(_way_out(start, along, sheet) for tail in drawn for start, along in _end(tail))
-
-
-def _end(tail: Tail) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Return the corners and the middle of a tail's end, each with the direction of the tail."""
-    long = math.hypot(tail.x1 - tail.x0, tail.y1 - tail.y0)
-    along = (tail.x1 - tail.x0) / long, (tail.y1 - tail.y0) / long
-    aside = -along[1] * tail.half, along[0] * tail.half
-    return [((tail.x1 + side * aside[0], tail.y1 + side * aside[1]), along) for side in (-1, 0, 1)]
-
-
-def _way_out(start: tuple[float, float], along: tuple[float, float], sheet: Sheet, beyond: float = 0.0) -> float:
-    """Return the way from a point along a direction out of the sheet's outline, mm; 0 from a point outside.
-
-    With `beyond` only whether the way is longer than that: 0 or the most that it can be. The outline is convex, so the
-    way is halved until it is known.
-    """
+def _is_covered(tail: Strip, sheet: Sheet, further: float) -> bool:
+    """Tell whether a corner or the middle of a tail's end, `further` along it by so much (mm), is under the sheet."""
+    (xa, ya), (xb, yb), half = tail
+    long = math.hypot(xb - xa, yb - ya)
+    along = (xb - xa) / long, (yb - ya) / long
     x0, y0, x1, y1 = sheet.outline
     r = sheet.corner_mm
-    inner = x0 + r, y0 + r, x1 - r, y1 - r
+    ends = [
+        (xb + further * along[0] - aside * along[1], yb + further * along[1] + aside * along[0])
+        for aside in (-half, 0.0, half)
+    ]
+    return any(to_box(at, at, (x0 + r, y0 + r, x1 - r, y1 - r)) <= r for at in ends)
 
-    def inside(way: float) -> bool:
-        at = start[0] + way * along[0], start[1] + way * along[1]
-        return to_box(at, at, inner) <= r
 
-    low, high = beyond, math.hypot(x1 - x0, y1 - y0)
-    if not inside(low):
-        return 0.0
-    while not beyond and high - low > EPS / 2:
+def _to_edge(tail: Strip, sheet: Sheet) -> float:
+    """Return how far a tail has to go on until all of its width is out of the sheet's outline, mm."""
+    x0, y0, x1, y1 = sheet.outline
+    low, high = 0.0, math.hypot(x1 - x0, y1 - y0)
+    # The outline is convex.
+    while high - low > EPS / 2:
         middle = (low + high) / 2
-        low, high = (middle, high) if inside(middle) else (low, middle)
+        low, high = (middle, high) if _is_covered(tail, sheet, middle) else (low, middle)
     return high
 
 
@@ -266,30 +218,23 @@ def covered_tails(array: Array) -> tuple[CoveredTail, ...]:
     """Return the tails that end under the sheet, in the order of places; () if the sheet covers none."""
     if not construction_of(array.construction, array.cast).own_tails:
         return ()
-    points = [Point(place.name, place.x, place.y) for place in array.places]
-    radii = [place.radius for place in array.places]
-    laid = [_tails(place, i) for i, place in enumerate(array.places)]
+    places, sheet = array.places, array.sheet
+    ways = Ways(places, sheet, [tails(place, place.angle_deg) for place in places])
     found = []
-    for i, place in enumerate(array.places):
-        if not ends_covered(place.unit, laid[i], array.sheet):
+    for i, place in enumerate(places):
+        if not ways.covered(i, place.angle_deg):
             continue
-        short = to_edge(laid[i], array.sheet)
+        others = [j for j in range(len(places)) if j != i]
+        ways.near[i] = sorted(others, key=lambda j, x=place.x, y=place.y: math.dist((x, y), (places[j].x, places[j].y)))
+        short = max(_to_edge(tail, sheet) for tail in ways.laid[i])
         length = tail_length(place.unit) + short
-        near = sorted(
-            (j for j in range(len(points)) if j != i), key=lambda j: math.dist(points[i][1:3], points[j][1:3])
+        free = (angle for angle in candidates(place) if not ways.covered(i, angle) and not ways.blocked(i, angle))
+        blocked = ways.blocked(i, place.angle_deg, length)
+        # A length to type: the next tenth that is not shorter.
+        typed = math.ceil(length * 10 - 1e-3) / 10
+        found.append(
+            CoveredTail(place.name, round(short, 2), typed, length_field(place.unit), blocked, next(free, None))
         )
-        blocked = in_the_way(_tails(place, i, length), i, points, radii, near, laid, array.sheet.strap_slots)
-        field = "fpcb.tail_length_mm" if place.unit.fpcb else "wires.length_mm"
-
-        def free(angle: float, place: Placed = place, i: int = i, near: Sequence[int] = near) -> bool:
-            """Tell whether the tail as it is comes out at an angle."""
-            turned = tails(place.unit, place.x, place.y, angle, i)
-            if ends_covered(place.unit, turned, array.sheet):
-                return False
-            return not in_the_way(turned, i, points, radii, near, laid, array.sheet.strap_slots)
-
-        turn = next((angle for angle in candidates(points[i]) if free(angle)), None)
-        found.append(CoveredTail(place.name, round(short, 2), _typed(length), field, blocked, turn))
     return tuple(found)
 
 
@@ -335,15 +280,6 @@ def covered_tails_warning(array: Array) -> list[str]:
         f"tails end under the sheet, {where_they_end(covered, MOST_NAMES)}. {longer_tails(covered, MOST_NAMES)} "
         "Solder wires to a tail that stays under the sheet before its unit goes in"
     ]
-
-
-def _tails(place: Placed, owner: int, length: float | None = None) -> list[Tail]:
-    return tails(place.unit, place.x, place.y, place.angle_deg, owner, length)
-
-
-def _typed(length: float) -> float:
-    """Return a length to type, mm: the next tenth that is not shorter."""
-    return math.ceil(length * 10 - 1e-3) / 10
 
 
 def _names(tails: Iterable[CoveredTail], most: int) -> str:

@@ -159,8 +159,10 @@ def list_consumables(
         note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide"
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
     named = {"caliper", *(tool for step in steps for tool in step.required_tools)}
-    injected = moulds.spec.moulds.pour == "injected"
-    if cups and not injected:
+    lidded = [batch for batch in batches if batch.step.lid]
+    tape = len(tape_places(moulds)) + len(side_places(moulds)) if cups else 0
+    strips = 2 * tape * sum(not step.lid for step in moulds.plan.steps)
+    if strips:
         named.discard("adhesive tape")  # its strips are on the list
     for tool in sorted(named, key=[*REQUIRED_TOOLS].index):
         unit, made, note = REQUIRED_TOOLS[tool]
@@ -175,11 +177,10 @@ def list_consumables(
         chamber = f"a chamber that reaches {number(VACUUM_INHG, 3)} inHg"
         note = f"at least {number(least, 2)} ml; {chamber}"
         yield Item("degassing container", 1, "piece", "tool", note, least)
-    if injected:
-        yield from injecting(batches)
-    elif cups:
-        strips = 2 * (len(tape_places(moulds)) + len(side_places(moulds))) * pours
+    if strips:
         yield Item("adhesive tape", strips, "strip", "bought", "8 mm wide, 30 mm long")
+    if lidded:
+        yield from injecting(lidded)
 
 
 def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:

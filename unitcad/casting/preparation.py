@@ -92,12 +92,10 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     spec, plan, lengths, resin = moulds.spec, moulds.plan, moulds.spec.moulds, in_resin(moulds)
     printed = [tool for tool in plan.pieces if tool.made == "printed"]
     mixed = {tool.kind for tool in printed if not tool.upside_down}
-    turned = join_words(
-        dict.fromkeys(
-            spaced(t.name.partition("-")[0]) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind
-            for t in printed
-            if t.upside_down
-        )
+    turned = dict.fromkeys(
+        spaced(t.name.partition("-")[0]) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind
+        for t in printed
+        if t.upside_down
     )
     solid_mm3 = solid_mm3 or sum(moulds.mesh(tool).volume() for tool in printed)
     files = mould_plates(moulds)
@@ -110,7 +108,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     plates = f"Plate: {there}"
     if len(files) > 1:
         plates = f"{len(files)} plates, since one bed does not hold all: {there}"
-    attitude = f" ({turned} upside down)" if turned else ""
+    attitude = f" ({join_words(turned)} upside down)" if turned else ""
     how = [f"{plates}. Print the pieces as they lie{attitude}, without supports."]
     layers = f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
     if resin:

@@ -170,7 +170,7 @@ def _stretches(line: Sequence[Phase]) -> Iterator[str]:
         # The end of a stage that began before a cure needs no name if another stage follows.
         names = [*(name for name in names if ": " not in name), phase.name]
         bench += phase.bench_min
-        if phase.wait_min or i == len(line):
+        if phase.wait_min or i == len(line) or line[i].start_min > phase.end_min + 1e-6:
             wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min and i == len(line) else ""
             yield f"- at {duration(begins)}: {', '.join(names)} ({duration(bench)}){wait}"
             names, bench = [], 0.0

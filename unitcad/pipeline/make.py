@@ -135,7 +135,7 @@ class Subject:
 
     def key(self, only: Sequence[str], check: bool) -> str:
         """Return the key under which variants share their making."""
-        return build_key(self.of, only, check)
+        return build_key(MouldSet(self.of), only, check)
 
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
         """Return the outputs of `only` that this subject has."""
@@ -189,7 +189,7 @@ def finish(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], st
 
 def geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
     """Return parts, steps, mould findings, mesh findings and files of a set's geometry."""
-    key = build_key(moulds.spec, only, check)
+    key = build_key(moulds, only, check)
     with store.entry(key, intact=lambda there: all(map(store.has, there["files"].values()))) as entry:
         if entry.data is None:
             entry.data = _geometry(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress)

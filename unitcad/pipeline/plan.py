@@ -143,12 +143,12 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
 # Inputs of a file:
 
 
-def build_key(spec: Spec, only: Sequence[str], check: bool) -> str:
+def build_key(moulds: MouldSet, only: Sequence[str], check: bool) -> str:
     """Return the key of a geometry with its files and findings; cheap, since no shape is drawn."""
-    formats, only = spec.output.formats, tuple(name for name in only if name in GEOMETRIC)
+    formats, only = moulds.spec.output.formats, tuple(name for name in only if name in GEOMETRIC)
     epoch = os.environ.get("SOURCE_DATE_EPOCH") if "step" in formats else None
     versions = sorted(kernel_versions(formats).items())
-    return digest(repr((MouldSet(spec).geometry, formats, (only, check), code_version(), versions, epoch)).encode())
+    return digest(repr((moulds.geometry, formats, (only, check), code_version(), versions, epoch)).encode())
 
 
 def geometry_key(moulds: MouldSet, *more: object) -> str:

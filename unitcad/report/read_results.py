@@ -22,6 +22,7 @@ from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError, misfit, missing_extra
 from unitcad.files import TEMPORARY
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import GEOMETRIC, build_key
 from unitcad.pipeline.write import ADDRESS, PAGE, STORE
@@ -414,4 +415,4 @@ def spec_in(folder: Path) -> Spec:
 
 def model_key(spec: Spec) -> str:
     """Return the key of a geometry, without silicones and formats: sixteen hex digits."""
-    return build_key(with_formats(spec), GEOMETRIC, False)[:16]
+    return build_key(MouldSet(with_formats(spec)), GEOMETRIC, False)[:16]

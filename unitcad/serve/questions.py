@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from pkgutil import resolve_name
 
 import msgspec
 
@@ -35,7 +33,7 @@ class Superseded(Exception):
 
 
 class Questions:
-    """The workers: for each kind of question one that answers, and one that is warm when that one is ended."""
+    """The workers, one for each kind of question, so that its parts stay in its memory."""
 
     def __init__(self, text: str, trusted: Trusted) -> None:
         self.trusted = msgspec.json.encode(trusted)
@@ -45,10 +43,10 @@ class Questions:
         self._newest: dict[tuple[str, What], asyncio.Event] = {}
 
     def pool(self, what: What) -> Pool:
-        """Return the workers of a kind, which start with the first look."""
+        """Return the worker of a kind, which first answers the question of the text at the start: this warms it up."""
         if what not in self._pools:
-            warm = (warm_up, *self._parts(Ask(text=self._text, what=what)))
-            self._pools[what] = Pool(2, memory=MEMORY, load=PRELOAD, prepare=warm)
+            self._pools[what] = Pool(memory=MEMORY, load=PRELOAD)
+            self._pools[what].submit(*self._parts(Ask(text=self._text, what=what)), seconds=ANSWER_S[what])
         return self._pools[what]
 
     async def ask(self, ask: Ask) -> bytes:
@@ -118,9 +116,3 @@ async def _either(answer: asyncio.Task[bytes], event: asyncio.Event) -> None:
         await asyncio.wait([answer, waiting], return_when=asyncio.FIRST_COMPLETED)
     finally:
         waiting.cancel()
-
-
-def warm_up(function: str, *parts: bytes) -> None:
-    """Answer a question whose answer is not wanted."""
-    with contextlib.suppress(Exception):
-        resolve_name(function)(*parts)

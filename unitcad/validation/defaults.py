@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from functools import lru_cache
-from typing import TYPE_CHECKING
-
-from unitcad.errors import Refusal, UnknownKey
-from unitcad.rooms import kind_of
-from unitcad.spec import convert
-from unitcad.spec.raw import EstimateTable
-from unitcad.text import with_article
-
-if TYPE_CHECKING:
-    from unitcad.attenuation.edge.ranges import LabFit
-import math
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
@@ -24,14 +14,50 @@ from unitcad import catalogue
 from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import EPS, check_ribs, farthest_push, leaf_mm, least_skirt, least_slot
-from unitcad.spec import Spec, motor_of
+from unitcad.errors import Refusal, UnknownKey
+from unitcad.rooms import kind_of
+from unitcad.spec import Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
-from unitcad.spec.raw import DEFAULT_MOTOR, Format, RawSpec
+from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, Format, RawSpec
 from unitcad.spec.resolved import CastLayer, Circuit, Estimate, MotorSize, Moulds, Output
-from unitcad.text import number
+from unitcad.text import number, with_article
+
+if TYPE_CHECKING:
+    from unitcad.attenuation.edge.ranges import LabFit
 
 FIELD = "estimate.fit"
 _NEXT = "name a lab-fit.toml, which `unitcad fit LAB` writes from measured units"
+UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
+"""What is assumed of a motor whose entry does not say: the paper's motor."""
+UNKNOWN_DRIVE: Drive = "flat"
+"""A coin ERM's, as the paper's motor is."""
+_BASE = {"plinth_height_mm": 2.0, "plate_mm": 4.0}
+"""The base's heights, before they end whole layers, mm; a plinth is higher where the leaves of resin cups need it."""
+_PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
+
+
+def resolve(raw: RawSpec) -> Spec:
+    """Return the resolved spec. Raises Refusal for the first value that is not valid."""
+    if is_custom(raw.design):
+        if raw.design_source is None:
+            raise Refusal("design_source", None, f"is required with design = {raw.design!r}")
+        if is_body_file(raw.design) and raw.parameters:
+            raise Refusal("parameters", "...", f"nothing reads them: {raw.design} is a file of bodies")
+        if raw.skin_mm:
+            raise Refusal("skin_mm", raw.skin_mm, "a custom design draws its own skin side", 0.0)
+    else:
+        for field in ("parameters", "design_source"):
+            if getattr(raw, field):
+                raise Refusal(field, "...", f"only a custom design takes it; {raw.design} does not")
+    design = design_of(raw)
+    spec = _with_defaults(raw, design)
+    if design.tooling == "complement":
+        for field, value in (("motor.lip_mm", spec.motor.lip_mm), ("moulds.draft_deg", spec.moulds.draft_deg)):
+            if value:
+                raise Refusal(field, value, "moulds by complement follow the bodies that a custom design draws", 0.0)
+    design.limits(spec, design.dimensions(spec))
+    check_ribs(spec)
+    return spec
 
 
 def check_fit(table: EstimateTable) -> None:
@@ -71,35 +97,6 @@ def lab_fit(text: str) -> LabFit:
         field, value, limit = wrong
         raise Refusal(f"{FIELD}: {field}", value, limit)
     return fit
-
-
-UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
-"""What is assumed of a motor whose entry does not say: the paper's motor."""
-UNKNOWN_DRIVE: Drive = "flat"
-"""A coin ERM's, as the paper's motor is."""
-_BASE = {"plinth_height_mm": 2.0, "plate_mm": 4.0}
-"""The base's heights, before they end whole layers, mm; a plinth is higher where the leaves of resin cups need it."""
-_PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
-
-
-def resolve(raw: RawSpec) -> Spec:
-    """Return the resolved spec. Raises Refusal for the first value that is not valid."""
-    if is_custom(raw.design):
-        if raw.design_source is None:
-            raise Refusal("design_source", None, f"is required with design = {raw.design!r}")
-        if is_body_file(raw.design) and raw.parameters:
-            raise Refusal("parameters", "...", f"nothing reads them: {raw.design} is a file of bodies")
-        if raw.skin_mm:
-            raise Refusal("skin_mm", raw.skin_mm, "a custom design draws its own skin side", 0.0)
-    else:
-        for field in ("parameters", "design_source"):
-            if getattr(raw, field):
-                raise Refusal(field, "...", f"only a custom design takes it; {raw.design} does not")
-    design = design_of(raw)
-    spec = _with_defaults(raw, design)
-    design.limits(spec, design.dimensions(spec))
-    check_ribs(spec)
-    return spec
 
 
 def _with_defaults(raw: RawSpec, design: Design) -> Spec:

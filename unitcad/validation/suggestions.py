@@ -111,7 +111,7 @@ def every_fault(first: Refusal, data: Mapping[str, Any], judge: Judge, sound: Ma
         return [first]
     if any(one.field == first.field for one in every):
         return every
-    return [_suggest(first, data, judge, sound), *every]
+    return [_suggest(first, data, judge, sound, not every), *every]
 
 
 def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> list[Refusal]:
@@ -134,7 +134,7 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
     for refusal, _ in typed:
         others = {path: value for other, passed in typed if other is not refusal for path, value in passed.items()}
         rest = with_changes(data, others)
-        every.append(_suggest(refusal, rest, judge, sound))
+        every.append(_suggest(refusal, rest, judge, sound, len(typed) == 1))
     return every if len(every) < 2 else _accepted_together(every, typed, data, judge)
 
 
@@ -175,8 +175,11 @@ def _does(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> bool:
     return refusal.nearest is not None and find_refusal(data, {refusal.field: refusal.nearest}, judge) is None
 
 
-def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
-    """Return the only fault of data with a suggestion: another value, another key, or several together."""
+def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any], alone: bool) -> Refusal:
+    """Return the only fault of data with a suggestion: another value, another key, or several together.
+
+    `alone`: the file had no other fault. Only then is the blame looked for in other keys, which takes many trials.
+    """
     if isinstance(refusal, UnknownKey) or _does(refusal, data, judge):
         return refusal
     field, value, limit = refusal.field, refusal.value, refusal.limit
@@ -192,7 +195,7 @@ def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Map
             if own[-1].nearest is not None and met[-1] is not own[-1]:
                 limit = f"{limit}; at {format_value(bad)}, {bare(met[met.index(own[-1]) + 1])}"
             return Refusal(field, value, limit, nearest_number(data, field, good, bad, judge))
-    if culprit := culprit_of(data, judge, sound):
+    if alone and (culprit := culprit_of(data, judge, sound)):
         return Refusal(field, value, f"{limit}; {write_changes(culprit, 'and')} would do")
     if field in together:
         rest = {path: other for path, other in together.items() if path != field}

@@ -4,8 +4,6 @@ Rayleigh's function in its classical form; the integral over a triangular path o
 Hankel functions along the vertical lines up and down from K, where they decay. Run by hand; needs mpmath only.
 """
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +15,7 @@ RULE = {"method": "gauss-legendre", "maxdegree": 6}
 RATIOS = (2, 10, 50, 150)
 
 
-def displacement(nu: float, r: float) -> mp.mpc:
+def displacement(nu, r):
     mu = mp.mpf(E) / (2 * (1 + mp.mpf(nu)))
     eps = (1 - 2 * mp.mpf(nu)) / (2 * (1 - mp.mpf(nu)))
     ks2 = RHO * mp.mpf(OMEGA) ** 2 / mu
@@ -46,7 +44,7 @@ def displacement(nu: float, r: float) -> mp.mpc:
     return near + (up + down) / 2
 
 
-def main() -> None:
+def main():
     mp.mp.dps = 18
     cases = []
     for nu in (0.3, 0.4999999, 0.5):

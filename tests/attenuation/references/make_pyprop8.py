@@ -7,8 +7,6 @@ under a vertical surface force. Its step source makes its velocity spectrum a di
 wavenumbers, so `spread`, the change from half as many, is what its figures are good for.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -28,7 +26,7 @@ MODELS = {  # thickness m, density kg/m3, Young's modulus Pa, Poisson's ratio; t
 RADII = (2e-3, 7e-3, 12e-3, 20e-3)
 
 
-def displacement(bodies: list, tan_delta: float, omega: float, depth: float, force: tuple, count: int) -> np.ndarray:
+def displacement(bodies, tan_delta, omega, depth, force, count):
     rows = []
     for h, rho, e, nu in bodies:
         mu = e / (2 * (1 + nu))
@@ -42,7 +40,7 @@ def displacement(bodies: list, tan_delta: float, omega: float, depth: float, for
     return pp.compute_spectra(model, source, stations, np.array([omega + 0j]), show_progress=False, stencil_kwargs=grid)
 
 
-def main() -> None:
+def main():
     cases = []
     for name, (bodies, tan_delta, omega, depth) in MODELS.items():
         found = {}

@@ -6,8 +6,6 @@ trimesh runs in this Python; admesh and prusa-slicer are Debian's; lib3mf's whee
 A verdict is `pass`, `altered` (read, and changed or found in need of repair), `fail`, `hang` (20 s) or `-` (not read).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import re
@@ -39,7 +37,7 @@ print(json.dumps(found))
 """
 
 
-def _run(*command: str) -> tuple[int, str] | None:
+def _run(*command):
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=20, errors="replace", check=False)
     except subprocess.TimeoutExpired:
@@ -47,7 +45,7 @@ def _run(*command: str) -> tuple[int, str] | None:
     return done.returncode, done.stdout + done.stderr
 
 
-def trimesh_says(path: Path) -> str:
+def trimesh_says(path):
     """`is_volume` of what trimesh loads with its usual processing; its 3MF reader needs further packages."""
     if path.suffix == ".3mf":
         return "-"
@@ -61,7 +59,7 @@ def trimesh_says(path: Path) -> str:
         return "fail"
 
 
-def admesh_says(path: Path) -> str:
+def admesh_says(path):
     """Exit code, and whether admesh's own table says that it changed anything."""
     if path.suffix != ".stl":
         return "-"
@@ -76,7 +74,7 @@ def admesh_says(path: Path) -> str:
     return "altered" if any(changed) else "pass"
 
 
-def slicer_says(path: Path) -> str:
+def slicer_says(path):
     """`prusa-slicer --info`: manifold, and whether it was repaired."""
     done = _run("prusa-slicer", "--info", str(path))
     if done is None:
@@ -90,7 +88,7 @@ def slicer_says(path: Path) -> str:
     return "altered" if "manifold = no" in said or repaired else "pass"
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lib3mf", required=True)
     given = parser.parse_args()

@@ -1,12 +1,10 @@
 """docs/evidence/check-peers.md: our verdicts, computed now, beside the frozen ones. `python table.py` writes it."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from pathlib import Path
 
-from unitcad.meshcheck import FileReport, Options, check_file
+from unitcad.meshcheck import Options, check_file
 
 HERE = Path(__file__).parent
 CORPUS = HERE.parent.parent / "corpus"
@@ -36,28 +34,28 @@ WHY = {
 }
 
 
-def frozen() -> dict[str, dict[str, str]]:
+def frozen():
     """The peers' verdicts by path inside the corpus."""
     return json.loads((HERE / "verdicts.json").read_text("utf-8"))
 
 
-def ours(path: str) -> FileReport:
+def ours(path):
     """Our report on a file of the corpus; the consortium's samples are held to the letter (`--3mf-strict`)."""
     return check_file(CORPUS / path, Options(strict_3mf=path.startswith("3mf-samples/")))
 
 
-def disagrees(verdict: str, peers: dict[str, str]) -> bool:
+def disagrees(verdict, peers):
     """Whether a peer that reads the format accepts what we refuse, or the other way round."""
     accepted = verdict != "error"
     return any((said == "pass") != accepted for said in peers.values() if said != "-")
 
 
-def _verdict(report: FileReport) -> str:
+def _verdict(report):
     codes = ", ".join(finding.code for finding in report.findings)
     return report.verdict + (f" ({codes})" if codes else "")
 
 
-def page() -> str:
+def page():
     """The page."""
     lines = [
         "# `unitcad check` and other programs",
@@ -86,7 +84,7 @@ def page() -> str:
     lines += ["", "The 3MF consortium's samples with `--3mf-strict`, files that must fail and must pass:", ""]
     lines += ["| | must fail: refused | must pass: accepted |", "| --- | --- | --- |"]
     for peer in ("unitcad", "lib3mf", "PrusaSlicer"):
-        counts: Counter[str] = Counter()
+        counts = Counter()
         for path, peers in known.items():
             if path.startswith("3mf-samples/"):
                 verdict = ours(path).verdict if peer == "unitcad" else peers[peer]

@@ -107,9 +107,7 @@ def drawing_of(array: Array) -> Drawing:
     pitch = min(array.pitch_mm, 2 * cup[1])
     # No plinth, so no ribs on it.
     lay = Layout(cells, MARK, pitch, (0.0, 0.0), cup, plate, label)
-    drawn = Drawing(
-        array, spec, dims, fins(array, wiring(array)), lay, Pins(places, height, moulds.plinth_clearance_mm)
-    )
+    drawn = Drawing(array, spec, dims, fins(array), lay, Pins(places, height, moulds.plinth_clearance_mm))
     return _cut(drawn)
 
 
@@ -161,36 +159,31 @@ def _beside(drawn: Drawing) -> list[Feature]:
     return found
 
 
-def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
+def _more_pins(drawn: Drawing) -> list[Point]:
     """Return pins for pieces of base and cups with fewer than two: on their outer sides."""
-    (x, y), units, cut_at = drawn.lay.cup, drawn.array.places, (*drawn.base_seams, *drawn.cup_seams)
+    (x, y), cut_at = drawn.lay.cup, (*drawn.base_seams, *drawn.cup_seams)
     out_y = drawn.pins.places[-1][1]
-    out_x = x - (y - out_y)
+    out = x - (y - out_y), out_y
     standing = list(drawn.pins.places)
-    for low_y, high_y in intervals((-y, y), cut_at, "y"):
-        for low_x, high_x in intervals((-x, x), cut_at, "x"):
-            if sum(low_x < at < high_x and low_y < up < high_y for at, up in standing) < 2:
-                ends = [side * out_y for side in (-1, 1) if low_y < side * out_y < high_y]
-                sides = [side * out_x for side in (-1, 1) if low_x < side * out_x < high_x]
-                each = 2 if len(ends) + len(sides) == 1 else 1
-                across, along = (low_x, high_x), (low_y, high_y)
-                new = [
-                    (at, end)
-                    for end in ends
-                    for at in _beside_slots(drawn, "back" if end > 0 else "front", [p.x for p in units], across, each)
-                ]
-                new += [
-                    (side, at)
-                    for side in sides
-                    for at in _beside_slots(drawn, "right" if side > 0 else "left", [p.y for p in units], along, each)
-                ]
-                standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
-    return tuple(standing[len(drawn.pins.places) :])
+    for along in intervals((-y, y), cut_at, "y"):
+        for across in intervals((-x, x), cut_at, "x"):
+            piece = across, along
+            if sum(across[0] < at < across[1] and along[0] < up < along[1] for at, up in standing) >= 2:
+                continue
+            own: list[Side] = [
+                side for side, (axis, sign) in _SIDES.items() if piece[axis][0] < sign * out[axis] < piece[axis][1]
+            ]
+            new: list[Point] = []
+            for side in own:
+                axis, sign = _SIDES[side]
+                middles = [(place.x, place.y)[1 - axis] for place in drawn.array.places]
+                for at in _beside_slots(drawn, side, middles, piece[1 - axis], 2 if len(own) == 1 else 1):
+                    new.append((at, sign * out[axis]) if axis else (sign * out[axis], at))
+            standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
+    return standing[len(drawn.pins.places) :]
 
 
-def _beside_slots(
-    drawn: Drawing, side: Side, middles: Sequence[float], within: tuple[float, float], count: int
-) -> list[float]:
+def _beside_slots(drawn: Drawing, side: Side, middles: Sequence[float], within: Interval, count: int) -> list[float]:
     """Return the places of pins on a side, as `_spots`, clear of its pry slots: at units' middles if possible."""
     by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
     slots = [slot.middle for slot in drawn.pry if slot.side == side]
@@ -202,7 +195,7 @@ def _beside_slots(
     return []
 
 
-def _spots(middles: Sequence[float], within: tuple[float, float], count: int) -> list[float]:
+def _spots(middles: Sequence[float], within: Interval, count: int) -> list[float]:
     """Return as many units' middles as asked for, the nearest to places spread evenly within an interval."""
     low, high = within[0] + 2 * PIN_RADIUS, within[1] - 2 * PIN_RADIUS
     inside = [middle for middle in middles if low < middle < high]
@@ -213,7 +206,7 @@ def _spots(middles: Sequence[float], within: tuple[float, float], count: int) ->
 def _slot(drawn: Drawing, fin: Fin) -> Feature:
     """Return the space of a fin's slot."""
     clearance = drawn.spec.moulds.plinth_clearance_mm
-    return box_feature(*fin.taken(drawn.array, fin.reach + clearance, clearance))
+    return box_feature(*fin.taken(fin.reach + clearance, clearance))
 
 
 UP, DOWN = (0, 0, 1), (0, 0, -1)
@@ -229,52 +222,55 @@ def slot_roof(spec: Spec) -> float:
     return core_top(spec) + spec.moulds.plinth_clearance_mm
 
 
-def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
-    """Return tools and pours of an array whose silicone is drawn as `cast`, pour by pour.
+def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") -> Plan:
+    """Return flat tools and pours of layers drawn as `cast`, the last of them the sheet's.
 
-    Tools larger than the bed are cut. Raises Refusal if they can't be, and for lids.
+    With a `label`, that of the whole set, they are only the inner layers: taken out and inserted elsewhere. Tools that
+    are larger than the bed are cut. Raises Refusal if they can't be.
     """
-    if array.unit.moulds.pour == "injected":
-        raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
-    return replace(_flat_plan(drawing_of(array), cast, last=True), stretches=bent_stretches(array))
-
-
-def inner_tools(array: Array, cast: Sequence[tuple[Shape, ...]], label: str) -> Plan:
-    """Return flat tools and pours of only the inner layers, drawn as `cast`: they are taken out and inserted elsewhere.
-
-    `label` is that of the whole set. Raises Refusal as `tools_plan`.
-    """
-    return _flat_plan(drawing_of(array), cast, last=False, label=label)
-
-
-def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: bool, label: str = "") -> Plan:
-    """Return tools and pours of layers drawn as `cast`; `last`: the last of them is the sheet's."""
-    spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
-    pours = range(1, len(cast) + 1)
-    sheets = [last and pour == len(cast) for pour in pours]
-    blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=sheets[pour - 1]) for pour in pours)]
+    drawing = drawing_of(array)
+    spec, dims, lay, pours = drawing.spec, drawing.dims, drawing.lay, len(cast)
+    sheets = [not label and pour == pours for pour in range(1, pours + 1)]
+    blanks = [_base(drawing), *(_cup(drawing, layer, last=sheet) for layer, sheet in enumerate(sheets))]
     label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
     base = base_piece(engrave(blanks[0], _base_letters(drawing, f"B{label}")))
-    base = replace(base, removal=DOWN) if last else base
-    cups = []
-    for pour, blank in zip(pours, blanks[1:], strict=True):
+    base = replace(base, removal=DOWN) if any(sheets) else base
+    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
+    cups: list[Body] = []
+    steps: list[Step] = []
+    for pour, (blank, sheet) in enumerate(zip(blanks[1:], sheets, strict=True), 1):
         cup = cup_piece(pour, engrave(blank, _cup_letters(drawing, pour, label)))
         # The last cup is a tray for the sheet: printed as drawn, and the patch leaves it, not it the patch.
-        cups.append(replace(cup, upside_down=False, removal=None) if sheets[pour - 1] else cup)
-    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
-    steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], filaments, sheet=sheets[pour - 1]) for pour in pours)
-    holes = [("base", len(filaments)), *((cup.name, len(lay.cells)) for cup in cups)]
-    bar = blade(lay, dims.heights[len(cast) - 1])
+        cups.append(replace(cup, upside_down=False, removal=None) if sheet else cup)
+        # The last cup can't be lifted past the sheet.
+        first = Removal(base.name, DOWN) if sheet else Removal(cup.name, UP)
+        pulled = [Removal(piece.name, DOWN) for piece in filaments]
+        rim = dims.heights[pour - 1]
+        steps.append(
+            Step(
+                index=pour,
+                name=f"layer{pour}",
+                material=array.sheet.material if sheet else spec.layers[pour - 1].material,
+                tools=(base.name, cup.name, *(piece.name for piece in filaments)),
+                layer=cast[pour - 1],
+                earlier=tuple(shape for shapes in cast[: pour - 1] for shape in shapes),
+                seals=tuple(_seals(drawing, pour - 1, last=sheet)),
+                rim=rim,
+                top=rim,
+                removals=(*pulled, first, Removal(CAST, UP)) if pour == pours else (first,),
+            )
+        )
+    bar = blade(lay, dims.heights[pours - 1])
     return Plan(
         (base, *cups, *filaments, blade_piece(bar, too_long=longer_than_bed(spec, 2 * lay.plate[1]))),
-        steps,
+        tuple(steps),
         lay,
         label,
         dims,
         concentric=False,
         pins=drawing.pins,
         pry_slots=tuple((slot.piece, slot.side, slot.middle) for slot in drawing.pry),
-        genus=tuple(holes),
+        genus=(("base", len(filaments)), *((cup.name, len(lay.cells)) for cup in cups)),
         splits=tuple(_splits(drawing, base, cups)),
     )
 
@@ -313,36 +309,6 @@ def _engraving(spec: Spec, top: float) -> tuple[float, float]:
     return top - spec.moulds.engraving_depth_mm, top + BEYOND
 
 
-def _step(
-    drawing: Drawing,
-    cast: Sequence[tuple[Shape, ...]],
-    pour: int,
-    base: Body,
-    cup: Body,
-    filaments: Sequence[Body],
-    *,
-    sheet: bool,
-) -> Step:
-    """Return a pour; the last of them casts the sheet, or its layers are taken out to be laid in elsewhere."""
-    last, rim = pour == len(cast), drawing.dims.heights[pour - 1]
-    pulled = [Removal(piece.name, DOWN) for piece in filaments] if last else []
-    # The last cup can't be lifted past the sheet.
-    first = Removal(base.name, DOWN) if sheet else Removal(cup.name, UP)
-    order = [*pulled, first, *([Removal(CAST, UP)] if last else [])]
-    return Step(
-        index=pour,
-        name=f"layer{pour}",
-        material=drawing.array.sheet.material if sheet else drawing.spec.layers[pour - 1].material,
-        tools=(base.name, cup.name, *(piece.name for piece in filaments)),
-        layer=cast[pour - 1],
-        earlier=tuple(shape for shapes in cast[: pour - 1] for shape in shapes),
-        seals=tuple(_seals(drawing, pour - 1, last=sheet)),
-        rim=rim,
-        top=rim,
-        removals=tuple(order),
-    )
-
-
 def _bottom(spec: Spec) -> float:
     """Return z of the base's lower face: its plate has no plinth."""
     return -spec.moulds.plate_mm
@@ -350,10 +316,10 @@ def _bottom(spec: Spec) -> float:
 
 def _base(drawing: Drawing) -> Shape:
     """Draw the base: plate, cores, fins and pins in one piece, with pry slots and the filaments' ways."""
-    spec, dims, lay, array = drawing.spec, drawing.dims, drawing.lay, drawing.array
+    spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
     plate = Extrude(outline(lay.plate, MARK), _bottom(spec), 0.0)
     cores = [moved(core(dims), cell.x, cell.y) for cell in lay.cells]
-    ridges = [fin.drawn(array, fin.reach, 0.0, -BEYOND, dims.core_height) for fin in drawing.fins]
+    ridges = [fin.drawn(fin.reach, 0.0, -BEYOND, dims.core_height) for fin in drawing.fins]
     ways = [filament.way(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells]
     # Drawn for a plate under a plinth.
     slots = [moved(pry_slot(spec, lay, side), z=-plate_top(spec)) for side in (1, -1)]
@@ -391,9 +357,7 @@ def _slots(drawing: Drawing) -> list[Shape]:
     """Draw the slots for the fins, open downwards."""
     spec = drawing.spec
     clearance = spec.moulds.plinth_clearance_mm
-    return [
-        fin.drawn(drawing.array, fin.reach + clearance, clearance, -BEYOND, slot_roof(spec)) for fin in drawing.fins
-    ]
+    return [fin.drawn(fin.reach + clearance, clearance, -BEYOND, slot_roof(spec)) for fin in drawing.fins]
 
 
 def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
@@ -413,7 +377,7 @@ def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
                 stops[i].append(_halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm))
     for fin in drawing.fins if low - slot_roof(spec) < moulds.least_wall_mm else ():
         wider = moulds.plinth_clearance_mm + moulds.least_wall_mm
-        stops[fin.place].append(box_feature(*fin.taken(drawing.array, outer + BEYOND, wider)))
+        stops[fin.place].append(box_feature(*fin.taken(outer + BEYOND, wider)))
     for seam in drawing.cup_seams:
         for strip in strips(seam, moulds.least_wall_mm + seam.play / 2):
             corners = tuple(unseen(corner, seam.across) for corner in strip)
@@ -438,7 +402,7 @@ def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
     spec, dims, lay, rim = drawing.spec, drawing.dims, drawing.lay, drawing.dims.heights[layer]
     x, y = lay.cup
     wall = cut(box(-x, x, -y, y, -BEYOND, rim), _bores(drawing, layer, last=last))
-    ridges = [fin.drawn(drawing.array, fin.reach, 0.0, -2 * BEYOND, dims.core_height) for fin in drawing.fins]
+    ridges = [fin.drawn(fin.reach, 0.0, -2 * BEYOND, dims.core_height) for fin in drawing.fins]
     seals = [cut(Common((wall, union(_slots(drawing)))), ridges)] if drawing.fins else []
     return seals + [filament.annulus(spec, dims, cell) for cell in lay.cells]
 
@@ -449,46 +413,40 @@ _EPS = 1e-6
 
 
 class Fin(NamedTuple):
-    """A way of the circuit out of a place's unit: along +x, -x, +y or -y, `half` wide to either side.
+    """A way of the circuit out of a unit at (x, y), the `place` of that number: along +x, -x, +y or -y.
 
-    `reach` is from the unit's centre to the fin's end, mm.
+    `half` wide to either side. `reach` is from the unit's centre to the fin's end, mm.
     """
 
     place: int
+    x: float
+    y: float
     direction: tuple[int, int]
     half: float
     reach: float
 
-    def drawn(self, array: Array, reach: float, wider: float, low: float, high: float) -> Shape:
+    def drawn(self, reach: float, wider: float, low: float, high: float) -> Shape:
         """Draw a box along the way, from the unit's centre to `reach`, `wider` to either side, from z to z."""
-        x0, y0, x1, y1 = self.taken(array, reach, wider)
+        x0, y0, x1, y1 = self.taken(reach, wider)
         return box(x0, x1, y0, y1, low, high)
 
-    def taken(self, array: Array, reach: float, wider: float) -> Box:
+    def taken(self, reach: float, wider: float) -> Box:
         """Return the box's extent in the plane, mm."""
-        at, (x0, x1, y0, y1) = array.places[self.place], self._sides(reach, wider)
-        return at.x + x0, at.y + y0, at.x + x1, at.y + y1
-
-    def about_the_axis(self, reach: float, wider: float, low: float, high: float) -> Shape:
-        """Draw the same with the unit's axis at x = y = 0."""
-        return box(*self._sides(reach, wider), low, high)
-
-    def _sides(self, reach: float, wider: float) -> tuple[float, float, float, float]:
         half, (dx, dy) = self.half + wider, self.direction
         x0, x1 = (min(0.0, dx * reach), max(0.0, dx * reach)) if dx else (-half, half)
         y0, y1 = (min(0.0, dy * reach), max(0.0, dy * reach)) if dy else (-half, half)
-        return x0, x1, y0, y1
+        return self.x + x0, self.y + y0, self.x + x1, self.y + y1
 
 
-def fins(array: Array, circuit: Wiring) -> tuple[Fin, ...]:
+def fins(array: Array) -> tuple[Fin, ...]:
     """Return the fins of an array's units, for every strip of the circuit that leaves a unit.
 
     A fin ends a seal's length outside its unit.
     """
-    wider = array.unit.moulds.slot_width_clearance_mm / 2
+    wider, places = array.unit.moulds.slot_width_clearance_mm / 2, array.places
     return tuple(
-        Fin(place, direction, half + wider, array.places[place].radius + SEAL)
-        for place, direction, half in sorted(set(_ways(array, circuit)))
+        Fin(i, places[i].x, places[i].y, direction, half + wider, places[i].radius + SEAL)
+        for i, direction, half in sorted(set(_ways(array, wiring(array))))
     )
 
 
@@ -516,7 +474,9 @@ STEP = 0.5
 LEAST_DEPTH = 0.8
 """Of a slot over a filament's groove, mm: the tip of a thin screwdriver still gets in (assumed)."""
 Side = Literal["left", "right", "front", "back"]
-_PAIRS: tuple[tuple[Side, Side], ...] = (("left", "right"), ("front", "back"))
+_SIDES: dict[Side, tuple[int, int]] = {"front": (1, -1), "back": (1, 1), "left": (0, -1), "right": (0, 1)}
+"""The axis that leads to each side, and its sign there."""
+_ENDS: tuple[Side, ...] = ("left", "right")
 
 
 class PrySlot(NamedTuple):
@@ -530,12 +490,11 @@ class PrySlot(NamedTuple):
     @property
     def customary(self) -> bool:
         """Whether it is one of the two that every base has."""
-        return self.side in _PAIRS[0] and self.middle == 0.0
+        return self.side in ("left", "right") and self.middle == 0.0
 
     def taken(self, lay: Layout) -> Box:
         """Return its extent on the plate, from under the cup to beyond the edge, mm."""
-        axis = int(self.side in ("front", "back"))
-        sign = 1 if self.side in ("right", "back") else -1
+        axis, sign = _SIDES[self.side]
         low, high = sorted((sign * (lay.cup[axis] - PRY_UNDER), sign * (lay.plate[axis] + BEYOND)))
         ends = self.middle - PRY_HALF_WIDTH, self.middle + PRY_HALF_WIDTH
         return (ends[0], low, ends[1], high) if axis else (low, ends[0], high, ends[1])
@@ -553,12 +512,10 @@ class Piece(NamedTuple):
     across: Interval
     along: Interval
 
-    def sides(self, lay: Layout) -> Iterator[Side]:
-        """Yield the sides of the base that it has."""
-        (x, y), ends = lay.plate, (*self.across, *self.along)
-        for side, end, edge in zip(("left", "right", "front", "back"), ends, (-x, x, -y, y), strict=True):
-            if end == edge:
-                yield side
+    def sides(self, lay: Layout) -> list[Side]:
+        """Return the sides of the base that it has."""
+        extent = self.across, self.along
+        return [side for side, (axis, sign) in _SIDES.items() if sign * lay.plate[axis] in extent[axis]]
 
 
 def pieces(lay: Layout, seams: Sequence[Seam]) -> list[Piece]:
@@ -580,19 +537,15 @@ def pry_slots(
     depth = plate_top(spec) - pry_floor(spec)
     found: list[PrySlot] = []
     for piece in pieces(lay, seams):
-        sides = set(piece.sides(lay))
-        own = [
-            PrySlot(piece.number, side, 0.0, depth)
-            for side in ("right", "left")
-            if side in sides and piece.along[0] < 0.0 < piece.along[1]
-        ]
-        for pair in () if own else _PAIRS:
+        sides = piece.sides(lay)
+        middle = piece.along[0] < 0.0 < piece.along[1]
+        own = [PrySlot(piece.number, side, 0.0, depth) for side in _ENDS[::-1] if side in sides and middle]
+        for pair in (_ENDS, ("front", "back")):
             own = own or [slot for side in pair if side in sides for slot in _at(spec, lay, piece, side, pins, hole)]
         if not own:
-            lack = "has no edge of the base" if not sides else "has no room at its edges"
-            return tuple(
-                found
-            ), f"piece {piece.number} of the base {lack} for a pry slot, and nothing would lever it off"
+            lack = "has no room at its edges" if sides else "has no edge of the base"
+            why = f"piece {piece.number} of the base {lack} for a pry slot, and nothing would lever it off"
+            return tuple(found), why
         found += own
     return tuple(found), ""
 
@@ -601,12 +554,12 @@ def _at(
     spec: Spec, lay: Layout, piece: Piece, side: Side, pins: Sequence[tuple[float, float]], hole: float
 ) -> Iterator[PrySlot]:
     """Yield the slot at a piece's side, the nearest to its middle that leaves room for a pin next to it; or none."""
-    axis = int(side in ("left", "right"))
-    ends, edge = (piece.along if axis else piece.across), lay.plate[axis]
+    to_side, sign = _SIDES[side]
+    axis = 1 - to_side
+    ends, edge = (piece.across, piece.along)[axis], lay.plate[axis]
     low, high = (end + sign * (BESIDE if abs(end) < edge else MARK) for end, sign in zip(ends, (1, -1), strict=True))
     near = PRY_HALF_WIDTH + hole + spec.moulds.least_wall_mm
-    sign = 1 if side in ("right", "back") else -1
-    standing = [pin[axis] for pin in pins if sign * pin[1 - axis] > 0]
+    standing = [pin[axis] for pin in pins if sign * pin[to_side] > 0]
     count = math.floor((high - low - 2 * PRY_HALF_WIDTH) / STEP + 1e-9)
     places = (low + PRY_HALF_WIDTH + STEP * i for i in range(count + 1))
     for middle in sorted(places, key=lambda place: (abs(place - (low + high) / 2), place)):
@@ -663,15 +616,11 @@ def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
     whole = replace(dims, exit=None, sides=())
     of_unit = design_of(spec).layers(spec, whole)
     drawn = [of_unit[f"layer{i + 1}"] for i in range(len(spec.layers))]
-    ways = fins(array, wiring(array))
-    notches = [way.drawn(array, dims.outer_radius + BEYOND, 0.0, -BEYOND, core_top(spec)) for way in ways]
-    of_place = [
-        [notch for way, notch in zip(ways, notches, strict=True) if way.place == i] for i in range(len(array.places))
-    ]
+    notches: list[list[Shape]] = [[] for _ in array.places]
+    for fin in fins(array):
+        notches[fin.place].append(fin.drawn(dims.outer_radius + BEYOND, 0.0, -BEYOND, core_top(spec)))
     pours = [
-        tuple(
-            cut(moved(shape, place.x, place.y), notched) for place, notched in zip(array.places, of_place, strict=True)
-        )
+        tuple(cut(moved(shape, place.x, place.y), own) for place, own in zip(array.places, notches, strict=True))
         for shape in drawn
     ]
     holes = tuple(slot_profile(slot) for slot in sheet.strap_slots)
@@ -682,22 +631,24 @@ def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
     return (*pours[:-1], (union((back, *pours[-1])),))
 
 
-def bodies(array: Array) -> tuple[Body, ...]:
-    """Return the silicone, a body a pour."""
+def pour_bodies(pours: Sequence[tuple[Shape, ...]]) -> tuple[Body, ...]:
+    """Return the silicone of some pours, a body each."""
     return tuple(
         Body(f"layer{i + 1}", "unit", "layer", union(shapes), layer_colour(i), made="cast", step=i + 1)
-        for i, shapes in enumerate(layers(array))
+        for i, shapes in enumerate(pours)
     )
 
 
 def plan(array: Array) -> Plan:
     """Return tools and pours. Raises Refusal for tools that are larger than the bed, and for a pour by injection."""
-    return tools_plan(array, layers(array))
+    if array.unit.moulds.pour == "injected":
+        raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
+    return replace(flat_plan(array, layers(array)), stretches=bent_stretches(array))
 
 
 def seal_places(array: Array, pour: int) -> str:
     """Return the places at which the slits of the fins are sealed before the cup of a pour (from 1) is put on."""
-    ridges = fins(array, wiring(array))
+    ridges = fins(array)
     if not ridges:
         return ""
     length = max(fin.reach for fin in ridges) - dimensions(array.unit).radii[pour - 1]
@@ -730,7 +681,7 @@ CONSTRUCTION = Construction(
     thickness_mm=1.25,
     apart=apart,
     level=level,
-    bodies=bodies,
+    bodies=lambda array: pour_bodies(layers(array)),
     plan=plan,
     assembly=assembly,
     greased=seal_places,

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.circuit import wiring
 from unitcad.arrays.constructions import Construction, Level, back_sheet
-from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, core_top, fins, inner_tools
+from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, core_top, fins
 from unitcad.arrays.sheet import angle_deg, axis, barrel, bent, bent_stretches, inside_of_end, slice_of, strap_slot
 from unitcad.catalogue import printers
-from unitcad.designs import Dimensions, design_of, dimensions, layer_colour
+from unitcad.designs import Dimensions, design_of, dimensions
 from unitcad.designs.design import BEYOND, Fitting
 from unitcad.errors import Refusal
 from unitcad.moulds.base import core
@@ -35,7 +34,6 @@ from unitcad.shape import (
     union,
 )
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
-from unitcad.shape.tree import Body
 from unitcad.spec import Spec, printer_of
 
 MOST_DEG = 75.0
@@ -174,19 +172,23 @@ class Former:
         return self.array.sheet.high + THICKNESS
 
 
-def curved_plan(
-    array: Array, flat: Sequence[tuple[Shape, ...]], laid: Sequence[tuple[Shape, ...]], poured: Shape
-) -> Plan:
-    """Return tools and pours of an array whose inner layers are cast as `flat` and laid in as `laid`, then `poured`.
+def plan(array: Array) -> Plan:
+    """Return tools and pours: inner layers that are cast flat and laid in, and the last pour under a lid.
 
-    Raises Refusal for tools beyond the bed.
+    Raises Refusal for tools that are larger than the bed, and for a limb too small.
     """
-    former = _former(array)
+
+    def middle(radius: float) -> float:
+        there = level((array.unit,), array.sheet.thickness_mm, radius)
+        return radius + (there.low + there.high) / 2
+
+    check_limb(array, back_sheet.apart(array.unit)[0], middle)
+    former, flat, (*laid, (poured,)) = _former(array), back_sheet.layers(array)[:-1], layers(array)
     pour = len(flat) + 1
     base, lid = _base(former), _lid(former)
     label = set_label((base, lid, poured, *(shape for shapes in flat for shape in shapes)))
-    base = base_piece(engrave(base, _base_letters(former, f"B{pour:X}{label}")))
-    lid = lid_piece(pour, engrave(lid, _lid_letters(former, f"L{pour:X}{label}")))
+    base = base_piece(engrave(base, _letters(former, f"B{pour:X}{label}", former.seat)))
+    lid = lid_piece(pour, engrave(lid, _letters(former, f"L{pour:X}{label}", former.top)))
     ways = [_down(axis(array, place.x)) for place in array.places]
     filaments = [
         replace(piece, removal=way) for piece, way in zip(filament_pieces(_filaments(former)), ways, strict=True)
@@ -215,7 +217,7 @@ def curved_plan(
         ),
     )
     holes = ((base.name, len(filaments)), (lid.name, len(channels)))
-    inner = inner_tools(array, flat, label)
+    inner = back_sheet.flat_plan(array, flat, label)
     return replace(
         inner,
         tools=(*(tool for tool in inner.tools if tool.kind != "blade"), base, lid, *filaments, *inner.of_kind("blade")),
@@ -305,13 +307,9 @@ def _bed(former: Former) -> Shape:
 
 def _moats(former: Former) -> list[Shape]:
     """Draw the units' space in the base: open upwards, round core and fins."""
-    array, dims, top = former.array, former.dims, core_top(former.spec)
-    ways = fins(array, wiring(array))
+    array, dims = former.array, former.dims
     drawn = []
-    for i, place in enumerate(array.places):
-        ridges = [
-            way.about_the_axis(dims.outer_radius + 2 * BEYOND, 0.0, -2 * BEYOND, top) for way in ways if way.place == i
-        ]
+    for place, ridges in zip(array.places, _notches(array, 2 * BEYOND), strict=True):
         moat = cut(cylinder(dims.outer_radius, 0.0, array.sheet.high + 2 * BEYOND), [core(dims), *ridges])
         drawn.append(bent(array, moat, place.x, place.y))
     return drawn
@@ -420,10 +418,7 @@ def _lid(former: Former) -> Shape:
 def _seals(former: Former) -> list[Shape]:
     """Draw seals at joints that meet only up to rounding: under and in the inserted layers."""
     array, dims = former.array, former.dims
-    inner, height = (
-        (dims.radii[-2], dims.heights[-2]) if len(dims.radii) > 1 else (dims.cavity_radius, dims.core_height)
-    )
-    drawn = cylinder(inner - JOINT, -JOINT, height - JOINT)
+    drawn = cylinder(dims.radii[-2] - JOINT, -JOINT, dims.heights[-2] - JOINT)
     return [*(bent(array, drawn, place.x, place.y) for place in array.places), *_land_seals(former)]
 
 
@@ -437,21 +432,11 @@ def _land_seals(former: Former) -> list[Shape]:
     return [Common((land, union(beside))), cut(land, [slice_of(array, x0 - JOINT, x1 + JOINT)])]
 
 
-def _base_letters(former: Former, label: str) -> list[Shape]:
-    """Draw the base's label on its seat, along the limb."""
-    return [_along(former, label, former.seat, -former.half[0])]
-
-
-def _lid_letters(former: Former, label: str) -> list[Shape]:
-    """Draw the lid's label on its upper face, along the limb."""
-    return [_along(former, label, former.top, -former.half[0])]
-
-
-def _along(former: Former, label: str, top: float, edge: float) -> Shape:
-    """Draw a label that reads along +y on a face, its foot towards +x."""
+def _letters(former: Former, label: str, top: float) -> list[Shape]:
+    """Draw a label that reads along the limb on a face, its foot towards +x."""
     stroke, depth = former.spec.moulds.engraving_stroke_mm, former.spec.moulds.engraving_depth_mm
     drawn = turned(engraving(label, stroke, top - depth, top + BEYOND), "z", 1)
-    return moved(drawn, edge + 1.0 + HEIGHT * stroke, -text_width(label, stroke) / 2)
+    return [moved(drawn, -former.half[0] + 1.0 + HEIGHT * stroke, -text_width(label, stroke) / 2)]
 
 
 def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
@@ -471,33 +456,30 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
     return Level(top - thickness, top, top - roof)
 
 
-def draw_inner_layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
-    """Draw the inner layers at their places around the limb, pour by pour, a solid a unit."""
-    drawn, count = _of_place(array), len(array.unit.layers) - 1
-    return tuple(
-        tuple(bent(array, drawn[n][i], place.x, place.y) for n, place in enumerate(array.places)) for i in range(count)
+def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
+    """Draw the silicone of each pour as it is worn: the inner layers, a solid a unit, then all that is poured last."""
+    spec, notches = array.unit, _notches(array, BEYOND)
+    drawn = design_of(spec).layers(spec, replace(dimensions(spec), exit=None, sides=()))
+    inner = (
+        tuple(
+            bent(array, cut(drawn[f"layer{i + 1}"], own), place.x, place.y)
+            for place, own in zip(array.places, notches, strict=True)
+        )
+        for i in range(len(spec.layers) - 1)
     )
+    return (*inner, (_poured(array, notches),))
 
 
-def _of_place(array: Array) -> list[list[Shape]]:
-    """Draw the inner layers of each place about the z axis, with the notches of the circuit."""
-    spec = array.unit
-    dims = dimensions(spec)
-    of_unit = design_of(spec).layers(spec, replace(dims, exit=None, sides=()))
-    return [[cut(of_unit[f"layer{i + 1}"], notched) for i in range(len(spec.layers) - 1)] for notched in notches(array)]
+def _notches(array: Array, beyond: float) -> list[list[Shape]]:
+    """Draw the notches of the circuit at each place, about the z axis, `beyond` unit and skin by so much (mm)."""
+    reach, top = dimensions(array.unit).outer_radius + beyond, core_top(array.unit)
+    found: list[list[Shape]] = [[] for _ in array.places]
+    for fin in fins(array):
+        found[fin.place].append(fin._replace(x=0.0, y=0.0).drawn(reach, 0.0, -beyond, top))
+    return found
 
 
-def notches(array: Array) -> list[list[Shape]]:
-    """Draw the notches of the circuit at each place, about the z axis."""
-    reach, top = dimensions(array.unit).outer_radius + BEYOND, core_top(array.unit)
-    ways = fins(array, wiring(array))
-    return [
-        [way.about_the_axis(reach, 0.0, -BEYOND, top) for way in ways if way.place == i]
-        for i in range(len(array.places))
-    ]
-
-
-def poured(array: Array) -> Shape:
+def _poured(array: Array, notches: Sequence[Sequence[Shape]]) -> Shape:
     """Draw the outermost layers and the sheet, in one piece."""
     sheet, spec, radius = array.sheet, array.unit, array.radius_mm or 0.0
     dims = dimensions(spec)
@@ -510,31 +492,10 @@ def poured(array: Array) -> Shape:
     rounds = [bent(array, cylinder(outer, 0.0, sheet.high + BEYOND), p.x, p.y) for p in array.places]
     rounds = Common((barrel(array, radius + (sheet.low + sheet.high) / 2), union(rounds)))
     hollow: list[Shape] = []
-    for place, notched in zip(array.places, notches(array), strict=True):
+    for place, notched in zip(array.places, notches, strict=True):
         hollow.append(bent(array, cylinder(inner, -BEYOND, height), place.x, place.y))
         hollow += [bent(array, notch, place.x, place.y) for notch in notched]
     return cut(union((back, rounds)), hollow)
-
-
-def bodies(array: Array) -> tuple[Body, ...]:
-    """Return the silicone as it is worn, a body a pour."""
-    shapes = [*(union(pour) for pour in draw_inner_layers(array)), poured(array)]
-    return tuple(
-        Body(f"layer{i + 1}", "unit", "layer", shape, layer_colour(i), made="cast", step=i + 1)
-        for i, shape in enumerate(shapes)
-    )
-
-
-def plan(array: Array) -> Plan:
-    """Return tools and pours. Raises Refusal for tools that are larger than the bed, and for a limb too small."""
-    spec, thickness = array.unit, array.sheet.thickness_mm
-
-    def middle(radius: float) -> float:
-        there = level((spec,), thickness, radius)
-        return radius + (there.low + there.high) / 2
-
-    check_limb(array, back_sheet.apart(spec)[0], middle)
-    return curved_plan(array, back_sheet.layers(array)[:-1], draw_inner_layers(array), poured(array))
 
 
 def assembly(array: Array) -> tuple[Fitting, ...]:
@@ -555,7 +516,7 @@ CONSTRUCTION = Construction(
     thickness_mm=1.25,
     apart=back_sheet.apart,
     level=level,
-    bodies=bodies,
+    bodies=lambda array: back_sheet.pour_bodies(layers(array)),
     plan=plan,
     assembly=assembly,
     greased=back_sheet.seal_places,

@@ -38,12 +38,9 @@ MARGIN = 1.0
 """Distance of a label from its edge, mm."""
 
 
-def tray_plan(array: Array, cast: Shape) -> Plan:
-    """Return tray, blade and the one pour of an array whose sheet is drawn as `cast`.
-
-    A tray that is longer than the printer's bed is cut. Raises Refusal if it can't be.
-    """
-    sheet, spec = array.sheet, array.unit
+def plan(array: Array) -> Plan:
+    """Return tray, blade and the one pour. A tray that is longer than the bed is cut; raises Refusal if it can't be."""
+    sheet, spec, cast = array.sheet, array.unit, cast_sheet(array)
     outer = _outer(array)
     cut_at = _seams(array, outer)
     drawn = tray(array)
@@ -184,7 +181,7 @@ def unfit(unit: Spec, sheet: Sheet) -> str:
     return ""
 
 
-def sheet(array: Array) -> Shape:
+def cast_sheet(array: Array) -> Shape:
     """Draw the sheet as it is cast, z = 0 at its side towards the skin (mm)."""
     drawn, thickness = array.sheet, array.sheet.thickness_mm
     holes = [
@@ -198,12 +195,7 @@ def sheet(array: Array) -> Shape:
 def bodies(array: Array) -> tuple[Body, ...]:
     """Return the sheet."""
     colour = layer_colour(2)
-    return (Body("layer1", "unit", "layer", sheet(array), colour, made="cast", step=1),)
-
-
-def plan(array: Array) -> Plan:
-    """Return the tray and its pour. Raises Refusal for a tray that is larger than the printer's bed."""
-    return tray_plan(array, sheet(array))
+    return (Body("layer1", "unit", "layer", cast_sheet(array), colour, made="cast", step=1),)
 
 
 CONSTRUCTION = Construction(
