@@ -21,7 +21,7 @@ from unitcad import catalogue
 from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimate_inputs import estimate_input
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.lab.material import (
     Specimen,
     evaluate,
@@ -306,6 +306,8 @@ def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path):
     spec = load({**PASTED, "materials": {"our blend": entry}, "estimate": {"moduli": "quasi-static"}})
     value = entry["quasistatic_modulus_kpa"]
     assert estimate_input(spec).layers[0].youngs_modulus.value == pytest.approx(1e3 * value["value"])
+    said = estimate_spec(spec)["assumptions"]
+    assert any(line.startswith("our blend youngs_modulus: quasi-static") for line in said)
     reason = estimate_input(load({**PASTED, "materials": {"our blend": entry}})).layers[0].youngs_modulus.note
     assert "data sheet" not in reason
     assert f"{entry['modulus_100pct_kpa']['value']:g} kPa; measured: 0.csv" in reason
