@@ -448,7 +448,7 @@ def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack):
     assert toe is not None
     assert toe.origin == pytest.approx(slack, abs=1e-6)
     exact = np.mean([YOUNG / 3 * (s**2 + s + 1) / s**2 for s in np.linspace(1.12, 1.24, 1001)])
-    assert moduli(strain, bar, 0.12, 0.24)[0].value == pytest.approx(exact, rel=1e-4)
+    assert moduli(strain, bar, 0.12, 0.24, toe)[0].value == pytest.approx(exact, rel=1e-4)
     plain = secant(strain, bar, 0.15)
     assert plain is not None
     assert (abs(plain / exact - 1) > 0.1) == (slack != 0)
