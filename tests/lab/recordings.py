@@ -102,3 +102,21 @@ def hangs(*asked):
     import time
 
     time.sleep(60)
+
+
+def mutated(content, rng):
+    """Change, insert, remove, copy or cut off some bytes.
+
+    Bytes removed in one place and as many inserted in another are no damage that a format without checksums shows.
+    """
+    data = bytearray(content)
+    moves = rng.random() < 0.6
+    for _ in range(rng.integers(1, 4)):
+        at, other = rng.integers(0, len(data), 2)
+        end = at + rng.integers(1, 9)
+        kinds = [(at + 1, rng.bytes(1)), (at + 1, rng.choice(list(b"\n,;\t .0-\xff\x00"), 1).astype("u1").tobytes())]
+        kinds += [(end, data[other : other + end - at])]
+        kinds += [(end, b""), (at, data[at:end]), (len(data) if rng.random() < 0.3 else at, b"")] if moves else []
+        last, fresh = kinds[rng.integers(0, len(kinds))]
+        data[at:last] = fresh
+    return mutated(content, rng) if moves and len(data) == len(content) else bytes(data)

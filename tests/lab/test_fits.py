@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import tomllib
 from dataclasses import replace
@@ -19,9 +18,9 @@ from typer.testing import CliRunner
 from unitcad.attenuation.edge.closed_form import crossings, published_path
 from unitcad.attenuation.edge.measured import measured_table, nominal
 from unitcad.attenuation.edge.models import COMPARED, assess_all, stored
-from unitcad.attenuation.edge.ranges import predictive, predictive_of, unit_key
+from unitcad.attenuation.edge.ranges import predictive_of, unit_key
 from unitcad.cli import app
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
 from unitcad.files import sha256
 from unitcad.lab.campaign import check_files, read_campaign
@@ -63,78 +62,82 @@ def test_the_shipped_lab_says_that_it_is_synthetic_and_gives_the_same_bytes():
 def test_the_units_on_which_the_models_differ_most_come_first():
     """The levels of each unit of the lab are those of a fit without it, whose own constants the model has."""
     lab = load_fit_lab("synthetic-bench")
-    result = fit_lab(lab)
-    rows = json.loads(contents(result)["fit.json"])["models_differ_on"]
+    made = contents(fit_lab(lab))
+    rows = json.loads(made["fit.json"])["models_differ_on"]
     assert {row["unit"] for row in rows} == {unit.name for unit in lab.units}
     assert [row["factor"] for row in rows] == sorted((row["factor"] for row in rows), reverse=True)
-    row = rows[0]
-    assert set(row["levels"]) == set(COMPARED) - {"baseline"}
-    assert row["factor"] == pytest.approx(max(row["levels"].values()) / min(row["levels"].values()), rel=1e-5)
-    unit = next(unit for unit in lab.units if unit.name == row["unit"])
-    others = replace(lab, units=tuple(other for other in lab.units if other is not unit))
-    without = fit_lab(others).fit.model["crossings"].constants["s"]
+    levels = rows[0]["levels"]
+    assert set(levels) == set(COMPARED) - {"baseline"}
+    assert rows[0]["factor"] == pytest.approx(max(levels.values()) / min(levels.values()), rel=1e-5)
+    (unit,) = [unit for unit in lab.units if unit.name == rows[0]["unit"]]
+    without = fit_lab(replace(lab, units=tuple(other for other in lab.units if other is not unit)))
     path = crossings(nominal(estimate_input(unit.spec, unit.frequency_hz)))
-    assert row["levels"]["crossings"] == pytest.approx(without * float(path[0]), rel=1e-4)
-    page = contents(result)["fit.md"]
-    assert f"| {rows[0]['unit']} |" in page.partition("## Units on which the models differ most")[2]
+    expected = without.fit.model["crossings"].constants["s"] * float(path[0])
+    assert levels["crossings"] == pytest.approx(expected, rel=1e-4)
+    assert f"| {unit.name} |" in made["fit.md"].partition("## Units on which the models differ most")[2]
 
 
 def test_levels_come_from_a_file_of_measure(tmp_path):
     level = {"distance_mm": 0.0, "value": 0.2, "low": 0.18, "high": 0.22, "frequency_hz": 131.5}
     rows = [
-        {"unit": "b", "spec": "campaign/u.toml", "chain": "line", **level},
+        {"unit": "b", "spec": "embedded", "chain": "line", **level},
         {"unit": "b", "chain": "bandpass", **level, "value": 0.3},
         {"unit": "b", "chain": "line", **level, "distance_mm": 5.0, "value": 0.1},
     ]
-    (tmp_path / "u.toml").write_text(Path("templates/embedded.toml").read_text())
-    sha = hashlib.sha256((tmp_path / "u.toml").read_bytes()).hexdigest()
-    measured = {
-        "status": "measured",
-        "chain": "line",
-        "level": rows,
-        "source": [{"file": "campaign/u.toml", "sha256": sha}],  # as the campaign's file names it
-    }
+    measured = {"status": "measured", "chain": "line", "level": rows}
     (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
-    units = [UNITS[0], {"name": "b", "spec": "u.toml", "measured": "measured.toml"}]
-    lab = load_fit_lab(_written(tmp_path, unit=units))
-    assert lab.units[1].level.value == 0.2
-    assert lab.units[1].frequency_hz == 131.5
-    assert {one.file for one in lab.inputs} == {"lab.toml", "u.toml", "measured.toml"}
-    units[1] = {**units[1], "spec": "encapsulating"}
-    measured["level"][0]["spec"] = "embedded"
-    (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
-    with pytest.raises(Refusal, match="measured of the template embedded, not encapsulating"):
-        load_fit_lab(_written(tmp_path, unit=units))
+    unit = {"name": "b", "spec": "embedded", "measured": "measured.toml"}
+    lab = load_fit_lab(_written(tmp_path, unit=[UNITS[0], unit]))
+    assert (lab.units[1].level.value, lab.units[1].frequency_hz) == (0.2, 131.5)
+    assert {one.file for one in lab.inputs} == {"lab.toml", "measured.toml"}
+    for change, part in (
+        ({"spec": "encapsulating"}, "measured of the template embedded, not encapsulating"),
+        ({"name": "c"}, "unknown name"),
+    ):
+        with pytest.raises(Refusal, match=part):
+            load_fit_lab(_written(tmp_path, unit=[UNITS[0], {**unit, **change}]))
     (tmp_path / "measured.toml").write_bytes(b"")
-    units[1] = {**units[1], "name": "c"}
-    with pytest.raises(UnitcadError):
-        load_fit_lab(_written(tmp_path, unit=units))
+    with pytest.raises(Refusal, match="is no file of unitcad measure"):
+        load_fit_lab(_written(tmp_path, unit=[UNITS[0], unit]))
 
 
 @pytest.mark.parametrize(
     ("changes", "field"),
     [
-        ({"unit": []}, "unit"),
-        ({"unit": [UNITS[0], UNITS[0]]}, "unit.1.name"),
-        ({"unit": [{"name": "a", "spec": "embedded"}]}, "unit.0.level"),
-        ({"unit": [{**UNITS[0], "measured": "m.toml"}]}, "unit.0.level"),
-        ({"unit": [{"name": "a", "spec": "embedded", "measured": "m.toml"}]}, "unit.0.measured"),
-        ({"unit": [{**UNITS[0], "spec": "embeded"}]}, "unit.0.spec"),
-        ({"unit": [{**UNITS[0], "set": {"layers.0.wall_mm": -1}}]}, "unit.0.layers.0.wall_mm"),
-        ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.3, "high": 0.4}}]}, "unit.0.level.value"),
-        ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.1}}]}, "unit.0.level.high"),
-        ({"unit": [{**UNITS[0], "level": {"value": -0.2}}]}, "unit.0.level.value"),
-        ({"unit": [{**UNITS[0], "frequency_hz": 0.1}]}, "unit.0.frequency_hz"),
-        ({"include_paper_units": False}, "unit"),
-        ({"moduli": "static"}, "moduli"),
-        ({"between_labs": -1.0}, "between_labs"),
-        ({"levels": 3}, "levels"),
+        ({"level": None}, "level"),
+        ({"measured": "m.toml"}, "level"),
+        ({"level": None, "measured": "m.toml"}, "measured"),
+        ({"spec": "embeded"}, "spec"),
+        ({"spec": None}, "spec"),
+        ({"set": {"layers.0.wall_mm": -1}}, "layers.0.wall_mm"),
+        ({"level": {"value": 0.2, "low": 0.3, "high": 0.4}}, "level.value"),
+        ({"level": {"value": 0.2, "low": 0.1}}, "level.high"),
+        ({"level": {"value": -0.2}}, "level.value"),
+        ({"frequency_hz": 0.1}, "frequency_hz"),
     ],
 )
-def test_what_is_refused(tmp_path, changes, field):
+def test_a_unit_that_can_not_be_meant_is_refused(tmp_path, changes, field):
+    unit = {key: value for key, value in {**UNITS[0], **changes}.items() if value is not None}
     with pytest.raises(Refusal) as refused:
-        fit_lab(load_fit_lab(_written(tmp_path, **changes)))
-    assert refused.value.field.startswith(field)
+        load_fit_lab(_written(tmp_path, unit=[unit]))
+    assert refused.value.field == f"unit.0.{field}"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "field"),
+    [
+        ("unit", [], "unit"),
+        ("unit", [UNITS[0], UNITS[0]], "unit.1.name"),
+        ("include_paper_units", False, "unit"),
+        ("moduli", "static", "moduli"),
+        ("between_labs", -1.0, "between_labs"),
+        ("levels", 3, "levels"),
+    ],
+)
+def test_a_lab_that_can_not_be_meant_is_refused(tmp_path, key, value, field):
+    with pytest.raises(Refusal) as refused:
+        fit_lab(load_fit_lab(_written(tmp_path, **{key: value})))
+    assert refused.value.field == field
 
 
 def test_a_silicone_without_a_modulus_leaves_that_source_out(tmp_path):
@@ -195,21 +198,16 @@ def thick(folder, scatter):
 def test_a_lab_where_thickness_matters_overturns_the_rule(tmp_path):
     """By the written rule: told apart from rule and baseline on the lab's own units, each left out."""
     result = fit_lab(load_fit_lab(thick(tmp_path, 0.05)))
-    assert result.fit.leads == "published"
+    assert result.fit.leads == result.chosen.order[0] == "published"
     judged = {name: np.abs(one.errors[one.own]) for name, one in result.chosen.judged.items()}
     for other in ("rule", "baseline"):
         assert judged["published"].mean() < judged[other].mean()
         assert stats.wilcoxon(judged["published"], judged[other]).pvalue < 0.05
-    assert result.chosen.order[0] == "published"
     assert "published leads: x " in contents(result)["fit.md"]
-    (tmp_path / "lab-fit.toml").write_text(contents(result)["lab-fit.toml"])
-    lossy = {"materials.lossy": {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}}
-    common = {
-        **lossy,
-        "layers.0.material": "lossy",
-        "diameter_mm": 45.0,
-        "estimate.fit": str(tmp_path / "lab-fit.toml"),
-    }
+    (tmp_path / "lab-fit.toml").write_text(fit_toml(result))
+    lossy = {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}
+    common = {"materials.lossy": lossy, "layers.0.material": "lossy", "diameter_mm": 45.0}
+    common["estimate.fit"] = str(tmp_path / "lab-fit.toml")
     thin, wide = (
         estimate_spec(load("embedded", {**common, "layers.0.wall_mm": wall}))["answer"] for wall in (2.0, 9.0)
     )
@@ -321,7 +319,6 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path):
         ({"cavity": 2, "cast": "gone.cast.json"}, None, "unit.0.cast", "no such file"),
         ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "excludes spec"),
         ({"cavity": 2, "cast": None, "spec": "encapsulating"}, None, "unit.0.cavity", "there is no cast"),
-        ({"cast": None}, None, "unit.0.spec", "is required, or cast"),
         ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record has the spec that was cast"),
         ({"cavity": 2}, lambda d: d.update(version=2), "unit.0.cast", "version = 2: must be at most 1"),
         ({"cavity": 2}, lambda d: d.pop("spec"), "unit.0.cast", "spec: is required here"),
@@ -370,23 +367,11 @@ def test_a_campaign_s_unit_goes_into_a_fit_by_its_cast_record(tmp_path):
         load_fit_lab(cast_fit_file(tmp_path, cavity=2, measured="m/measured.toml"))
 
 
-@pytest.mark.parametrize(
-    ("unit", "field", "part"),
-    [
-        (f'cast = "{CAST}"', "unit.0.cavity", "is required"),
-        (f'cast = "{CAST}"\ncavity = 3', "unit.0.cavity", "not usable"),
-        ('cast = "c.toml"', "unit.0.cast", "JSON"),
-        ('spec = "encapsulating"\ncavity = 1', "unit.0.cavity", "there is no cast"),
-        (f'spec = "encapsulating"\ncast = "{CAST}"', "unit.0.cast", "excludes spec"),
-    ],
-)
-def test_a_campaign_checks_the_record_before_it_measures(unit, field, part, tmp_path):
+def test_a_campaign_checks_the_record_before_it_measures(tmp_path):
     cast_record(tmp_path)
-    campaign = _campaign(tmp_path, unit)
-    with pytest.raises(Refusal) as refused:
-        check_files(read_campaign(campaign), tmp_path)
-    assert refused.value.field == field
-    assert part in str(refused.value)
+    with pytest.raises(Refusal, match="not usable") as refused:
+        check_files(read_campaign(_campaign(tmp_path, f'cast = "{CAST}"\ncavity = 3')), tmp_path)
+    assert refused.value.field == "unit.0.cavity"
 
 
 TABLE = measured_table()
@@ -401,23 +386,9 @@ def constants_of(model, table, weights):
     return model.fit(table, weights[None])[0]
 
 
-def _picked_units(indices, logs):
-    def pick(values):
-        return tuple(values[i] for i in indices)
-
-    return replace(
-        TABLE,
-        names=pick(TABLE.names),
-        designs=pick(TABLE.designs),
-        layers=pick(TABLE.layers),
-        levels=np.exp(logs),
-        inputs=pick(TABLE.inputs),
-    )
-
-
 def _campaigns(own, rng, between, errors=0.0):
     indices = [*range(9), *own]
-    table = _picked_units(indices, rng.normal(-1.0, 0.7, len(indices)))
+    table = replace(TABLE.rows(indices), levels=np.exp(rng.normal(-1.0, 0.7, len(indices))))
     ours = np.arange(len(indices)) >= 9
     return Campaigns(table, ours, np.where(ours, errors, 0.0), between)
 
@@ -465,16 +436,11 @@ def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
     assert scores == pytest.approx(before, abs=0.025)
     assert judged["baseline"].score == pytest.approx(1.327, abs=0.001)
     assert judged["rule"].score == pytest.approx(1.290, abs=0.001)
-
-
-def test_intervals_that_were_measured_before():
-    alone = Campaigns(TABLE, np.zeros(9, dtype=bool), np.zeros(9))
-    judged = {name: judge(MODELS[name], alone) for name in ("divider", "crossings", "published", "baseline")}
-    assert [judged[name].coverage for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
+    if moduli == "small-strain":  # units in their 80 % range, as they were counted before
+        assert [judged[name].coverage for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
     one, two = (np.abs(judged[name].errors) for name in ("divider", "baseline"))
-    assert paired_difference(judged["divider"], judged["baseline"])[:2] == pytest.approx(
-        (np.mean(one - two), stats.sem(one - two))
-    )
+    difference, error, _ = paired_difference(judged["divider"], judged["baseline"])
+    assert (difference, error) == pytest.approx((np.mean(one - two), stats.sem(one - two)))
 
 
 def test_stored_constants_are_the_catalogue_s():
@@ -499,49 +465,36 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file, t
     spec = load("embedded", {"estimate.fit": str(fit_file)})
     data, plain = estimate_spec(spec), estimate_spec(load("embedded"))
     fit = tomllib.loads(text)
+    x = fit["model"]["divider"]["constants"]["kappa"] * 355 / 15
+    gradients = {"divider": [-x / (1 + x), 1.0], "rule": [1.0, 1.0]}
     for model, block in data["models"].items():
-        one, before = fit["model"][model], plain["models"][model]
-        assert "predictive" not in before
-        s = one["constants"]["s"] / stored()[model]["s"]
-        if model in ("published", "corrected"):
-            assert block["edge_level"]["value"] == pytest.approx(s * before["edge_level"]["value"], rel=1e-5)
-        g = np.ones(1)
-        if model == "divider":
-            x = one["constants"]["kappa"] * 355 / 15
-            assert block["edge_level"]["value"] == pytest.approx(one["constants"]["s"] / (1 + x), rel=1e-8)
-            g = np.array([-x / (1 + x), 1.0])
-        if model == "rule":
-            assert block["edge_level"]["value"] == pytest.approx(
-                one["constants"]["s"] * one["constants"]["q"], rel=1e-5
-            )
-            g = np.ones(2)
+        one, before, level = fit["model"][model], plain["models"][model], block["edge_level"]["value"]
+        s = one["constants"]["s"]
+        expected = s / stored()[model]["s"] * before["edge_level"]["value"]
+        expected = {"divider": s / (1 + x), "rule": s * one["constants"].get("q", 1)}.get(model, expected)
+        assert level == pytest.approx(expected, rel=1e-5)
+        g = np.array(gradients.get(model, [1.0]))
         scale = one["model_error"] * np.sqrt(1 + g @ np.array(one["covariance"]) @ g)
-        centre = np.log(block["edge_level"]["value"])
-        ends = np.exp(stats.t.ppf([0.1, 0.9], one["degrees_of_freedom"], centre, scale))
+        ends = np.exp(stats.t.ppf([0.1, 0.9], one["degrees_of_freedom"], np.log(level), scale))
         assert [block["predictive"]["p10"], block["predictive"]["p90"]] == pytest.approx(ends, rel=1e-7)
-        made = predictive(fit_of(spec), model, estimate_input(spec))  # type: ignore[arg-type]
-        assert made == pytest.approx((one["degrees_of_freedom"], centre, scale), rel=1e-7)
         error = block["fit_error"]
         assert error["leave_one_out"]["geometric_mean"] == one["leave_one_out"]
-        assert error["leave_one_out"]["low"] < one["leave_one_out"] < error["leave_one_out"]["high"]
-        assert (error["own_leave_one_out"], error["own_by_stored"]) == (one["own_leave_one_out"], one["own_by_stored"])
-        assert error["coverage"] == one["coverage"]
+        keys = ("own_leave_one_out", "own_by_stored", "coverage")
+        assert [error[key] for key in keys] == [one[key] for key in keys]
         assert error["baseline"] == fit["model"]["baseline"]["leave_one_out"]
         assert block["table_error"] == before["table_error"]  # of the stored constants, and said to be
-        assert "fit_error" not in before
+        assert not {"fit_error", "predictive"} & set(before)
     assert data["table_error"]["constants"].startswith("the stored ones")
-    assert "constants" not in plain["table_error"]
     assert data["fit"]["name"] == "synthetic-bench"
-    assert data["fit"]["leave_one_out"]["baseline"]["geometric_mean"] == fit["model"]["baseline"]["leave_one_out"]
     assert data["fit"]["leads"] == data["answer"]["model"] == "rule"
     assert [own["value"] for own in data["own_measured"]] == [0.098]
     assert data["measured"]["level"] == plain["measured"]["level"]
-    thicker = load(spec, {"layers.0.wall_mm": 1.3})
-    assert estimate_spec(thicker)["own_measured"] == []
+    assert estimate_spec(load(spec, {"layers.0.wall_mm": 1.3}))["own_measured"] == []
     table = frequency_table_of_spec(spec, [100.0])
     assert table["fit"] == {key: data["fit"][key] for key in ("file", "sha256", "name")}
-    rows = table["frequencies"]
-    assert rows[0]["edge_level"]["rule"]["value"] == pytest.approx(data["models"]["rule"]["edge_level"]["value"])
+    assert table["frequencies"][0]["edge_level"]["rule"]["value"] == pytest.approx(
+        data["models"]["rule"]["edge_level"]["value"]
+    )
 
 
 def test_a_spec_names_its_fit_and_stands_alone(fit_file, tmp_path):
@@ -610,35 +563,30 @@ def test_a_sweep_s_table_takes_the_fit(fit_file, tmp_path):
     assert levels[0] == pytest.approx(exact)
 
 
-def _bad(text, *path, value):
-    data = tomllib.loads(text)
-    node = data
-    for step in path[:-1]:
-        node = node[step]  # type: ignore[index]
-    if value is None:
-        del node[path[-1]]  # type: ignore[arg-type]
-    else:
-        node[path[-1]] = value  # type: ignore[index]
-    return tomli_w.dumps(data)
-
-
 @pytest.mark.parametrize(
     ("path", "value", "says"),
     [
-        (("model", "published"), None, "model.published: is required"),
-        (("model", "published", "constants"), {"kappa": 1.0}, "must be s"),
-        (("model", "published", "constants", "s"), -1.0, "model.published.constants.s"),
-        (("model", "published", "degrees_of_freedom"), 0, "degrees_of_freedom"),
-        (("model", "divider", "covariance"), [[1.0]], "needs 2 rows"),
-        (("model", "divider", "covariance"), [[1.0, 3.0], [3.0, 1.0]], "is no covariance"),
-        (("model", "published", "model_error"), 0.0, "model_error"),
-        (("format",), 2, "format"),
-        (("moduli",), "quasi-static", "quasi-static moduli"),
-        (("surprise",), 1, "surprise"),
+        ("model.published", None, "model.published: is required"),
+        ("model.published.constants", {"kappa": 1.0}, "must be s"),
+        ("model.published.constants.s", -1.0, "model.published.constants.s"),
+        ("model.published.degrees_of_freedom", 0, "degrees_of_freedom"),
+        ("model.divider.covariance", [[1.0]], "needs 2 rows"),
+        ("model.divider.covariance", [[1.0, 3.0], [3.0, 1.0]], "is no covariance"),
+        ("model.published.model_error", 0.0, "model_error"),
+        ("format", 2, "format"),
+        ("moduli", "quasi-static", "quasi-static moduli"),
+        ("surprise", 1, "surprise"),
     ],
 )
 def test_a_bad_fit_is_refused(text, path, value, says, tmp_path):
-    (tmp_path / "bad.toml").write_text(_bad(text, *path, value=value))
+    *way, last = path.split(".")
+    data = node = tomllib.loads(text)
+    for step in way:
+        node = node[step]
+    node[last] = value
+    if value is None:
+        del node[last]
+    (tmp_path / "bad.toml").write_text(tomli_w.dumps(data))
     done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(tmp_path / "bad.toml")])
     assert isinstance(done.exception, Refusal)
     assert done.exception.exit_code == 2

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from recordings import CENTRES, COUNT, FORMATS, RATE, hangs, write_tdms
+from recordings import CENTRES, COUNT, FORMATS, RATE, hangs, mutated, write_tdms
 from recordings import columns as recorded
 
 from unitcad.errors import Refusal, UnitcadError
@@ -56,10 +56,6 @@ def test_every_format_gives_the_same_columns(name, tmp_path):
         ("rigolwfm/DS1052E.csv", 8192, "Voltage", "V", None, 1.72, -0.04),
         ("rigolwfm/DS1074Z-A.csv", 1200, "CH1", "Volt", 2e-5, 0.0, None),
         ("soft-robotics-materials-database/Ecoflex 00-10.csv", 751, "True Strain", "", None, 0.04361, None),
-        ("soft-robotics-materials-database/Ecoflex 00-30.csv", 705, "True Strain", "", None, 0.06574, None),
-        ("soft-robotics-materials-database/Ecoflex 00-50.csv", 721, "True Strain", "", None, 0.04364, None),
-        ("soft-robotics-materials-database/Dragon Skin 10 MEDIUM.csv", 457, "True Strain", "", None, 0.0436133, None),
-        ("soft-robotics-materials-database/Dragon Skin 30.csv", 311, "True Strain", "", None, 0.0436333333, None),
     ],
 )  # fmt: skip
 def test_files_by_others_are_read(name, count, channel, unit, step_s, first, last):
@@ -139,6 +135,17 @@ def test_a_long_text_is_read_whole(tmp_path):
         more.write("7\n8,9.0\n")
     with pytest.raises(Unreadable, match=f"line {count + 2} "):
         open_recording(file).columns((0,))
+
+
+def test_hdf5_tells_its_time_and_a_channel_goes_without_its_group(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, unit in (("G/t", "s"), ("G/x", "um"), ("H/y", "um")):
+            file[name] = np.arange(9.0)
+            file[name].attrs["units"] = unit
+    recording = open_recording(tmp_path / "a.h5")
+    assert (recording.time, recording.index("x", "channel")) == (0, 1)
 
 
 def test_a_library_that_never_returns_is_a_refusal(tmp_path, monkeypatch):
@@ -324,34 +331,6 @@ def test_lost_samples_leave_their_places_empty(tmp_path):
 
 LONGEST = 90.0
 """Seconds that a damaged file of some kilobytes may take."""
-
-
-def mutated(content, rng):
-    """Change, insert, remove, copy or cut off some bytes.
-
-    Bytes removed in one place and as many inserted in another are no damage that a format without checksums shows.
-    """
-    data = bytearray(content)
-    moves = rng.random() < 0.6
-    for _ in range(int(rng.integers(1, 4))):
-        at = int(rng.integers(0, max(len(data), 1)))
-        span = min(int(rng.integers(1, 9)), len(data) - at)
-        match int(rng.integers(0, 6 if moves else 3)):
-            case 0:
-                data[at : at + 1] = bytes([int(rng.integers(0, 256))])
-            case 1:
-                data[at : at + 1] = b"\n,;\t .0-\xff\x00"[int(rng.integers(0, 10)) :][:1]
-            case 2:
-                other = int(rng.integers(0, max(len(data) - span, 1)))
-                data[at : at + span] = data[other : other + span]
-            case 3:
-                del data[at : at + span]
-            case 4:
-                data[at:at] = bytes(data[at : at + span])
-            case _:
-                if rng.random() < 0.3:
-                    del data[at:]
-    return mutated(content, rng) if moves and len(data) == len(content) else bytes(data)
 
 
 def shifted(path):

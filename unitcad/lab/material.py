@@ -369,16 +369,11 @@ def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
     return float(np.interp(at, strain, stress)) / at
 
 
-def default_method(low: float, high: float) -> str:
-    """Return the default method's name for a strain of use."""
-    return f"secant over {100 * low:.3g} to {100 * high:.3g} %, toe fitted"
-
-
-def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float) -> tuple[Modulus, ...]:
+def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float, toe: Toe | None) -> tuple[Modulus, ...]:
     """Return Young's modulus by every method, the default first; strain rises, stress in Pa, use is `low` to `high`."""
     made = []
     ends = f"the curve ends at {100 * strain[-1]:.3g} %"
-    name, toe = default_method(low, high), fit_start(strain, stress, high)
+    name = f"secant over {100 * low:.3g} to {100 * high:.3g} %, toe fitted"
     if strain[-1] < high:
         made.append(Modulus(name, None, ends))
     elif toe is None:
@@ -471,7 +466,8 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
             limit = "is given twice" if before.path == curve.path else f"has the same content as {before.name}"
             raise Refusal("FILES", curve.name, f"{limit}: one specimen counts once")
         known[curve.sha256] = curve
-    by_curve = (moduli(curve.strain, curve.stress, *used) for curve in curves)
+    toes = tuple(fit_start(curve.strain, curve.stress, used[1]) for curve in curves)
+    by_curve = (moduli(curve.strain, curve.stress, *used, toe) for curve, toe in zip(curves, toes, strict=True))
     rows = tuple(_row(methods) for methods in zip(*by_curve, strict=True))
     chosen = rows[0]
     if chosen.value is None:
@@ -492,7 +488,6 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     geometry = max(_area_error(curve.specimen) for curve in curves)
     widened = math.exp(math.hypot(scatter or 0.0, geometry))
     rates = [curve.rate for curve in curves if curve.rate]
-    toes = tuple(fit_start(curve.strain, curve.stress, used[1]) for curve in curves)
     values = [row.value for row in rows if row.value is not None and row.defensible]
     warnings = []
     for curve, toe in zip(curves, toes, strict=True):
@@ -572,7 +567,6 @@ def _doubts(
 
 
 Deformation = Literal["shear", "tension"]
-LEAST_POINTS = 5
 GEOMETRY_ERROR = 0.05
 """Relative error of the modulus by the specimen's size and its clamping (assumed); the loss factor has none of it."""
 FLOOR_PER_DECADE, UNTESTED_PER_DECADE = 0.1, 0.3

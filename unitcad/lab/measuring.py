@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,7 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
             specs[name] = sha256(folder / name)
         records[unit.name] = tuple(one := _records(unit, campaign, folder, mains, stated, say))
         findings += [finding for record in one for finding in record.findings]
-        for role, distance in _places(unit):
+        for role, distance, _ in sorted(_places(unit), key=itemgetter(1)):
             more, said = _levels(unit, role, distance, one, campaign)
             levels += more
             findings += said
@@ -181,10 +182,10 @@ def _sensors(campaign: Campaign) -> tuple[SensorTable, ...]:
     return (campaign.sensor, motor) if campaign.recording.motor_channel is not None else (campaign.sensor,)
 
 
-def _places(unit: UnitTable) -> list[tuple[str, float]]:
-    """Return role and distance of a unit's places, the nearest first."""
-    points = sorted((point.distance_mm, f"{point.distance_mm:g} mm") for point in unit.point)
-    return [("edge", 0.0)] * bool(unit.edge) + [(role, distance) for distance, role in points]
+def _places(unit: UnitTable) -> list[tuple[str, float, tuple[str, ...]]]:
+    """Return role, distance and records of a unit's places, in the order of the file."""
+    edge = [("edge", 0.0, unit.edge)] if unit.edge else []
+    return edge + [(f"{point.distance_mm:g} mm", point.distance_mm, point.records) for point in unit.point]
 
 
 def _records(
@@ -214,8 +215,7 @@ def _records(
         middle = float(np.median(hertz))
         band = (max(band[0], middle * (1 - NEAR_MOTOR)), min(band[1], middle * (1 + NEAR_MOTOR)))
     sensors = _sensors(campaign)
-    places = [("edge", unit.edge), *((f"{point.distance_mm:g} mm", point.records) for point in unit.point)]
-    for role, names in places:
+    for role, _, names in _places(unit):
         for name in names:
             add(name, role, sensors, mains, band)
     return out

@@ -265,12 +265,14 @@ def _rate(
 
     Raises Refusal if the file says another rate than the campaign does.
     """
-    if table.rate_hz is None:
-        return _own_rate(recording, table, time, column, shown)
     try:
-        own, _ = _own_rate(recording, table, time, column, shown)
-    except Refusal:  # it says none that could be compared
-        return table.rate_hz, None
+        own, stamps = _own_rate(recording, table, time, column, shown)
+    except Refusal:
+        if table.rate_hz is None:
+            raise
+        return table.rate_hz, None  # the file says none that could be compared
+    if table.rate_hz is None:
+        return own, stamps
     if abs(table.rate_hz / own - 1) > SAME_RATE:
         says = "its header" if time is None else f"its column {recording.channels[time].name!r}"
         limit = f"differs from {shown}, which has {own:.6g} Hz by {says}"
@@ -426,15 +428,11 @@ def measure_record(
     if outside is not None:
         findings.append(finding("L117", shown, f"a stronger line is at about {outside:.0f} Hz, outside chain.band_hz"))
     hertz = fit.frequency_hz
-    factor = displacement(sensors[0], hertz) / signal.gain(hertz)
-    ratio, lag = None, None
+    scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
+    factor, ratio, lag = abs(scales[0]), None, None
     if motor is not None:  # displacement over the motor's, and its phase, behind the motor's if negative
-        turn = [displacement(sensor, hertz) / 1j ** _ORDER[sensor.quantity] for sensor in sensors]
-        value = fit.value / motor.value * turn[0] / turn[1]
+        value = fit.value * scales[0] / (motor.value * scales[1])
         ratio, lag = abs(value), float(np.degrees(np.angle(value)))
-        over = displacement(sensors[0], hertz) / displacement(sensors[1], hertz)
-    else:
-        over = factor
     by_chain, gains, unfit = {}, {}, []
     part = samples[int(fit.start_s * rate) : int(np.ceil(fit.end_s * rate)) + 1]
     for chain in chains:
@@ -444,14 +442,15 @@ def measure_record(
             message = f"the filters of the chain {chain.name} pass {gain:.3f} of {hertz:.2f} Hz"
             findings.append(finding("L106", shown, message))
         try:
-            values = [chain.amplitude(part[:, i], rate, each) for i, each in enumerate((fit, *motors))]
+            each = zip(part.T, (fit, *motors), scales, strict=True)
+            value, *below = [abs(scale) * chain.amplitude(x, rate, one) for x, one, scale in each]
             reason = chain.unfit([fit, *motors])
         except Refusal as refusal:
-            values, reason = [], refusal.limit
+            value, below, reason = 0.0, [], refusal.limit
         if reason:
             unfit.append(finding("L114", shown, f"{chain.name}: {reason}"))
         elif gain >= LEAST_GAIN:
-            by_chain[chain.name] = over * (values[0] / values[1] if motor else values[0])
+            by_chain[chain.name] = value / below[0] if below else value
     findings += unfit
     return replace(
         none,
@@ -472,10 +471,10 @@ def measure_record(
     )
 
 
-def displacement(sensor: SensorTable, frequency_hz: float) -> float:
+def displacement(sensor: SensorTable, frequency_hz: float) -> complex:
     """Return um of displacement per unit of the sensor at a frequency: a line over (j omega) once or twice."""
     si = to_si(sensor.unit, sensor.quantity, "sensor.unit")
-    return 1e6 * si / (2 * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
+    return 1e6 * si / (2j * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
 
 
 def _fits(

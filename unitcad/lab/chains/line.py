@@ -401,8 +401,8 @@ SILENT = 0.2
 QUIET = 0.4
 """The same for the rest of the silence without mains: a line that has only changed its frequency is louder."""
 LOWEST_HZ = 20.0
-FALL = 6
-"""Points of the envelope, 8 a window, over which that of a line that ends falls, with a margin."""
+FALL_S = 0.75 * WINDOW_S
+"""How long the envelope of a line that ends takes to fall, with a margin."""
 LEAST_SILENT = 0.2
 """Part of a record that is silent at least."""
 LOUDEST, BEYOND_LOUDEST = 0.92, 1.5
@@ -427,7 +427,8 @@ def running_part(x: Floats, good: Bools, rate: float, band: tuple[float, float],
     on = size >= ON * size.max()
     if on.mean() > MOST_RUNNING:
         return None
-    quiet = np.logical_not(binary_dilation(on, iterations=FALL))
+    fall = max(int(FALL_S / float(np.median(np.diff(time)))), 1)
+    quiet = np.logical_not(binary_dilation(on, iterations=fall))
     if quiet.mean() < LEAST_SILENT or size[quiet].max() > SILENT * size.max():
         return None
     first, last = _longest(quiet)

@@ -61,7 +61,6 @@ def _read_hdf5(path: Path) -> list[Channel]:
     """Return the numeric data sets of one or two dimensions. Raises Unreadable for data in other files."""
     import h5py
 
-    _expect_whole(path)
     found: list[Channel] = []
 
     def visit(name: str, node: Any) -> None:
@@ -87,24 +86,6 @@ def _read_hdf5(path: Path) -> list[Channel]:
     if not found:
         raise Unreadable(str(path), None, "has no data set of numbers")
     return found
-
-
-def _expect_whole(path: Path) -> None:
-    """Raise Unreadable if the file does not end at the byte that its superblock states."""
-    size = path.stat().st_size
-    with open(path, "rb") as file:
-        base = 0
-        while base < size and file.read(8) != b"\x89HDF\r\n\x1a\n":
-            base = 2 * base or 512
-            file.seek(base)
-        rest = file.read(64)
-    if len(rest) < 64:
-        raise Unreadable(str(path), None, "is no HDF5 file")
-    at = {0: 32, 1: 36}.get(rest[0], 20)
-    lengths = rest[5] if rest[0] < 2 else rest[1]
-    end = int.from_bytes(rest[at : at + 8], "little")
-    if lengths == 8 and end not in (size, size - base):
-        raise Unreadable(str(path), None, f"states {end} bytes and has {size}: it was not closed, or is damaged")
 
 
 def _expect_stored(path: Path, name: str, node: Any) -> None:

@@ -43,11 +43,9 @@ def _record(path: Path, one: dict[str, Any]) -> Channel:
     where = f"{path.name}: data set {name!r}"
     if np.iscomplexobj(data) or data.ndim != 1:
         raise Unreadable(str(path), None, f"{where} is no real record over time")
-    count, header = int(one["num_pts"]), one.get("n_bytes")
+    count = int(one["num_pts"])
     if len(data) != count or len(data) < 2:
         raise Unreadable(str(path), None, f"{where} states {count} points and has {len(data)}")
-    if int(one["binary"]) and header not in (count * 4, count * 8):
-        raise Unreadable(str(path), None, f"{where} states {header} bytes for {count} points")
     if int(one["abscissa_spec_data_type"]) not in (0, TIME_UNITS):
         raise Unreadable(str(path), None, f"{where} does not run over time")
     if int(one["abscissa_spacing"]) != 1:
