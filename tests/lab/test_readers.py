@@ -329,6 +329,16 @@ def test_lost_samples_leave_their_places_empty(tmp_path):
     np.testing.assert_allclose(signal.samples[:, 0], expected, atol=1e-5)
 
 
+def test_a_universal_file_that_is_cut_off_is_refused_with_its_whole_first_channels(tmp_path):
+    """pyuff reads the data sets before the cut and says nothing."""
+    name = next(name for name in FORMATS if name.endswith(".uff"))
+    FORMATS[name](tmp_path / name)
+    content = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(content[: int(0.9 * len(content))])
+    with pytest.raises(UnitcadError, match="is cut off"):
+        open_recording(tmp_path / name)
+
+
 LONGEST = 90.0
 """Seconds that a damaged file of some kilobytes may take."""
 

@@ -22,6 +22,8 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the time records of a universal file as channels. Raises Unreadable for a file without any."""
     import pyuff
 
+    if not path.read_bytes().rstrip().endswith(b"-1"):
+        raise Unreadable(str(path), None, "is cut off: it does not end with the -1 that closes a data set")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         file = pyuff.UFF(str(path))
