@@ -79,16 +79,6 @@ def test_grams_of_the_paper_units(name, grams):
         assert net == pytest.approx(expected, abs=6e-4)
 
 
-def test_a_scale_of_a_hundredth_of_a_gram_is_3_to_12_percent_wrong():
-    errors = [
-        next(f.value for f in pour.figures if f.name == "scale's error on a part, net")
-        for name in ("embedded", "encapsulating")
-        for pour in procedure(name).pours
-    ]
-    assert min(errors) == pytest.approx(2.6, abs=0.1)
-    assert max(errors) == pytest.approx(11.9, abs=0.2)
-
-
 def test_mix_covers_waste_and_least_batch():
     spec = set_of("encapsulating", "casting.waste=0.25", "casting.minimum_mix_g=0.1").spec
     mix = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0)
