@@ -270,10 +270,3 @@ def test_a_layer_without_a_silicone_is_no_printed_part(tmp_path):
         build(flex, tmp_path / "out", only=("unit",))
     more = load(spec_of(tmp_path, "body.3mf", layers=2))
     assert [body.made for body in unit_bodies(more)] == ["cast", "cast", "bought"]
-
-
-def test_step_without_the_extra_is_one_sentence(tmp_path, monkeypatch):
-    name = step_design(tmp_path)
-    monkeypatch.setattr("unitcad.meshcheck.readers.read_step.find_spec", lambda name: None)
-    with pytest.raises(Refusal, match=r"F012: STEP needs the extra"):
-        load(spec_of(tmp_path, name))

@@ -2,30 +2,17 @@
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
+from tests.in_process import unitcad as run
 from unitcad import cli
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
-
-
-def run(*words, cwd=None, **environment):
-    return subprocess.run(
-        [sys.executable, "-m", "unitcad", *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=cwd,
-        env={**os.environ, **environment},
-        timeout=120,
-    )
 
 
 @pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])

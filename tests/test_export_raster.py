@@ -87,13 +87,6 @@ def test_lines_run_round_smooth_patches_and_wires_along_all_sides():
     assert wired[100, 99:101].min() == int(lit * raster.WIRE)
 
 
-def test_png_is_what_pillow_reads_back():
-    picture = np.random.default_rng(2).integers(0, 256, (37, 53, 3), np.uint8)
-    data = raster.encode_png(Image.fromarray(picture))
-    assert data == raster.encode_png(Image.fromarray(picture))
-    assert np.array_equal(np.array(Image.open(io.BytesIO(data))), picture)
-
-
 def test_the_line_of_two_triangles():
     flat = np.array([[-4, -4, 0], [4, -4, 0], [0, 4, 0]], float)
     upright = np.array([[-1, 0, -1], [1, 0, -1], [0, 0, 3]], float)

@@ -72,14 +72,6 @@ def test_layout_never_overlaps(footprints):
             assert max(x - ox - ow, ox - x - w, y - oy - od, oy - y - d) >= printing.GAP_MM - 1e-9
 
 
-def test_same_bytes_and_fixed_dates(parts):
-    data = printing.content(parts)
-    assert printing.content(parts) == data
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        assert archive.namelist()[0] == "[Content_Types].xml"
-        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-
-
 def test_names_are_escaped(parts):
     odd = printing.MeshPart('a<b>"&', (0, 0.5, 1), parts[-1].vertices, parts[-1].faces)
     node = next(model(printing.content([odd])).iter(f"{CORE}object"))

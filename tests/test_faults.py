@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.spec.toml import line_of
 from unitcad.validation import load, put, read, templates
 from unitcad.validation.plain_data import ABSENT, at
 
@@ -148,40 +147,6 @@ def test_several_planted_faults_are_all_found(name, tmp_path):
         put(data, path, planted[path])
     refused = refusal(data)
     assert sorted(one.field for one in (refused, *refused.others)) == sorted(chosen)
-
-
-def test_lines_of_every_value_of_a_file_in_all_its_forms():
-    """Against a count by hand of each statement: strings over lines, dotted keys, inline tables, arrays of tables."""
-    text = '''# a comment
-a.b = 1
-text = """
-[not.a.table]
-x = 1
-"""
-
-list = [ # over lines
-  { p = 1 },
-  { p = 2 },
-]
-[t]
-"odd key" = 1
-[t.deep]
-x = [1,
- 2]
-[[rows]]
-k = 1
-[[rows]]
-k = 2
-  [rows.sub]
-  z = """a
-b"""
-'''
-    lines = {"a.b": 2, "text": 3, "list": 8, "list.1.p": 8, "t.odd key": 13, "t.deep.x": 15, "t.deep.x.1": 15}
-    lines |= {"rows.0.k": 18, "rows.1": 19, "rows.1.k": 20, "rows.1.sub.z": 22, "t.missing": 12, "rows.1.missing": 19}
-    for path, line in lines.items():
-        assert line_of(text, path) == line, path
-    assert line_of(text, "nothing") is None
-    assert line_of(text.replace("\n", "\r\n"), "rows.1.sub.z") == 22
 
 
 def test_at_follows_no_index_beyond_a_list():

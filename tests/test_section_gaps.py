@@ -22,19 +22,6 @@ def star(pick, x, y):
     return np.stack([x + radii * np.cos(angles), y + radii * np.sin(angles)], axis=1)
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "least"), [(5.0, 0.0, 3.0), (5.0, 6.0, 5.0), (2.0, 0.5, 0.0), (100.0, 0.0, 9.0)], ids=str
-)
-def test_the_gap_of_two_squares(x, y, least):
-    """Side to side, corner to corner, touching, and farther than is looked for."""
-    assert between_outlines([square(1)], [square(1, x, y)], 9.0) == pytest.approx(least, abs=1e-12)
-
-
-def test_a_side_counts_between_its_ends_and_so_does_a_hole():
-    frame = CrossSection([square(9), square(5)[::-1]])
-    assert gap(CrossSection([square(1, 0.25, 2)]), frame, 9.0) == pytest.approx(2.0, abs=1e-9)
-
-
 def test_what_overlaps_or_lies_inside_has_no_gap():
     whole = CrossSection([square(9)])
     for x in (0, 8.9):

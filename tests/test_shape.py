@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.shape import (
-    Extrude,
     Place,
-    Profile,
     ProfileError,
     Revolve,
     box,
@@ -74,22 +72,6 @@ def test_revolved_volumes_have_a_closed_form(r, width, height):
 def test_area_true_polygons_keep_a_cylinders_volume(radius, segments):
     body = cylinder(radius, 0, 2)
     assert realise(body, segments).volume() == pytest.approx(exact_volume(body), rel=1e-9)
-
-
-def test_an_arc_revolved_is_a_sphere_and_a_torus():
-    quarter = math.tan(math.pi / 8)
-    ball = Revolve(Profile(((0, -2, quarter), (2, 0, quarter), (0, 2, 0))))
-    assert exact_volume(ball) == pytest.approx(4 / 3 * math.pi * 8, rel=1e-12)
-    torus = Revolve(Profile(((4, 0, quarter), (5, -1, quarter), (6, 0, quarter), (5, 1, quarter))))
-    assert exact_volume(torus) == pytest.approx(2 * math.pi**2 * 5, rel=1e-12)
-    assert torus.profile.bounds == pytest.approx((4, -1, 6, 1))
-
-
-def test_a_taper_has_the_volume_of_its_frustum():
-    below, above = rectangle(-2, -2, 2, 2), rectangle(-1, -1, 1, 1)
-    frustum = Extrude(below, 0, 3, top=above)
-    assert exact_volume(frustum) == pytest.approx(3 / 3 * (16 + 4 + 8), rel=1e-12)
-    assert realise(frustum, 32).volume() == pytest.approx(28, rel=1e-12)
 
 
 def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not():

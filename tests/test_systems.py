@@ -67,14 +67,9 @@ def test_a_path_on_another_drive_is_shown_whole(monkeypatch):
     assert files.path_seen_from("/x/b/c.stl") == "/x/b/c.stl"
 
 
-@pytest.mark.parametrize("name", ["con", "CON", "Nul.toml", "com1", "lpt9.tar.gz", "aux "])
-def test_names_of_devices_are_known(name):
-    assert files.names_device(name)
-
-
-@pytest.mark.parametrize("name", ["cone", "com", "com10", "my-con", "null", "lpt"])
-def test_other_names_are_no_devices(name):
-    assert not files.names_device(name)
+def test_names_of_devices_are_known():
+    assert all(map(files.names_device, ["con", "CON", "Nul.toml", "com1", "lpt9.tar.gz", "aux "]))
+    assert not any(map(files.names_device, ["cone", "com", "com10", "my-con", "null", "lpt"]))
 
 
 def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path, monkeypatch):
@@ -131,8 +126,15 @@ def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path, monkeypatch
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a terminal of Windows takes any character")
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
-@pytest.mark.parametrize("words", [["estimate"], ["estimate", "--json"], ["build", "--formats", "stl"]])
+@pytest.mark.parametrize(
+    ("encoding", "words"),
+    [
+        ("ascii", ["estimate"]),
+        ("ascii", ["estimate", "--json"]),
+        ("latin-1", ["build", "--formats", "stl"]),
+        ("utf-8", ["estimate"]),
+    ],
+)
 def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding, words, tmp_path):
     import json
     import subprocess

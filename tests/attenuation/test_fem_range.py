@@ -1,4 +1,4 @@
-"""The range of model `fem`: seeded, the same for a material in every unit, made only when it is asked for."""
+"""The range of model `fem`: seeded, the same for a material in every unit, made on demand; the page's table."""
 
 import itertools
 import json
@@ -14,6 +14,8 @@ from msgspec.structs import replace
 
 pytest.importorskip("skfem")
 
+from benchmarks.accuracy.fem_search import COMPONENTS, unit_levels
+from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.fem import unit as prior_range
 from unitcad.attenuation.fem.unit import CHOICES, DRAWS, Draw, Setting, draw_unknowns, level, motion, range_block
 from unitcad.attenuation.inputs import Quantity
@@ -22,6 +24,7 @@ from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
 
 UNIT = estimate_input(load("encapsulating"))
+DATA = json.loads((Path(__file__).parents[2] / "docs" / "fem.json").read_text("utf-8"))
 
 
 def test_a_draw_is_its_seed_and_index_and_stays_in_the_ranges():
@@ -105,11 +108,10 @@ def test_draws_are_spread_evenly():
 
 @pytest.mark.long  # quick: draws are spread evenly, and the range is repeatable
 def test_the_default_draws_agree_with_256():
-    data = json.loads((Path(__file__).parents[2] / "docs/fem.json").read_text("utf-8"))
-    known = np.array(data["draws"])[:, data["units"].index("encapsulating E10/D30")]
-    bonded = np.array([Draw(data["seed"], index, len(known)).either("contact") for index in range(len(known))])
+    known = np.array(DATA["draws"])[:, DATA["units"].index("encapsulating E10/D30")]
+    bonded = np.array([Draw(DATA["seed"], index, len(known)).either("contact") for index in range(len(known))])
     for one in range_block(UNIT)["levels"]:
-        levels = known[:, data["drives"].index(one["drive"]), data["readings"].index(one["reading"])]
+        levels = known[:, DATA["drives"].index(one["drive"]), DATA["readings"].index(one["reading"])]
         for contact, part in (("bonded", levels[bonded]), ("resting", levels[~bonded])):
             group = one["by_contact"][contact]
             assert abs(math.log(group["median"] / np.median(part))) < 2 * math.log(group["median_error"]), one
@@ -161,3 +163,15 @@ def test_the_change_over_frequency_is_as_the_page_on_what_to_measure_says():
         low, high = (level(unit, hertz, "flat", "edge", draw, 0.5) for hertz in (60.0, 200.0))
         ratios.append(high / low)
     assert np.quantile(ratios, [0.1, 0.9]) == pytest.approx([0.2, 3.0], rel=0.1)
+
+
+@pytest.mark.parametrize("index", [None, 0])
+def test_a_row_is_made_again(index):
+    unit = DATA["units"][4]
+    draw = None if index is None else Draw(DATA["seed"], index, len(DATA["draws"]))
+    found = unit_levels(unit, draw, DATA["fineness"])
+    stored = np.array(DATA["nominal"] if index is None else DATA["draws"][index])[4]
+    assert stored[0] == pytest.approx(found[0, :, COMPONENTS.index("radial"), 0], rel=1e-3)
+    assert stored[1] == pytest.approx(found[1, :, COMPONENTS.index("normal"), 0], rel=1e-3)
+    assert tuple(DATA["units"]) == measured_table().names
+    assert len(DATA["draws"]) >= 100

@@ -6,7 +6,7 @@ import pytest
 from casting_rules import broken_rules
 
 from tests.sample_bodies import LEADLESS
-from unitcad.casting.pouring import LEVEL_AGAIN, TACK
+from unitcad.casting.pouring import LEVEL_AGAIN, TACK, Face
 from unitcad.casting.procedure import procedure
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, templates
@@ -23,7 +23,12 @@ def casting(*source):
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
-@pytest.mark.parametrize("source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS], ids=" ".join)
+WAYS = ((), ("moulds.printer=sla",), ("casting.vacuum=false",))
+
+
+@pytest.mark.parametrize(
+    "source", [*((name, *way) for name in templates() for way in WAYS), LIDS, FILM, STRAPS], ids=" ".join
+)
 def test_every_set_keeps_every_rule(source):
     assert broken_rules(casting(*source)) == []
 
@@ -154,7 +159,32 @@ def pulled_on_the_bench(made):
     return replace(made, release=tuple(replace(s, text=s.text.removeprefix(out)) for s in made.release))
 
 
+def changed(**fields):
+    return lambda made: of_first_pour(made, lambda pour: replace(pour, **fields))
+
+
+def without_step(words):
+    """Leave out what a step does, in the preparation and in the first pour."""
+
+    def left(steps):
+        return tuple(step for step in steps if words not in f"{step.title}: {step.text}")
+
+    def plant(made):
+        made = replace(made, preparation=left(made.preparation))
+        return of_first_pour(made, lambda pour: replace(pour, steps=left(pour.steps)))
+
+    return plant
+
+
 PLANTED = {
+    "agent on a bond face": (("encapsulating",), changed(agent=(Face("base", "core"),)), "whose cast bonds to"),
+    "agent too early": (("encapsulating",), changed(agent=(Face("cup1", "bore"),)), "agent before the last pour"),
+    "no degassing": (("encapsulating",), without_step("Degas for"), "pour 1: not degassed"),
+    "no time to degas": (("encapsulating",), changed(degassing_min=0.0), "pour 1: not degassed"),
+    "no vacuum": (("encapsulating",), lambda made: replace(made, vacuum=False), "the bill asks for a vacuum"),
+    "cup not held": (("encapsulating",), without_step("Hold cup 1 down"), "nothing holds the cup down"),
+    "tongue left in": (("encapsulating",), without_step("Tongue out FIRST"), "the cup is lifted over a tongue"),
+    "windows of resin": (RESIN, without_step("Clear the windows"), "cup1 is not cleared of resin"),
     "filament under a unit's mould": (("encapsulating",), pulled_on_the_bench, "while the mould lies on them"),
     "tape under the plate": (("encapsulating",), tilted_by_tape, "look at the level again"),
     "lids' bands": (LIDS, tilted_by_tape, "look at the level again"),

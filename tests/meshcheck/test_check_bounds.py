@@ -11,8 +11,6 @@ from unitcad.geometry import boxes
 from unitcad.geometry.boxes import TooMany
 from unitcad.meshcheck.geometry import crossings, sieves
 
-Points = np.ndarray
-
 
 def cone(n, height=30, cap=True):
     """A cone of n facets of radius 20; its base is a fan round its middle, or round a point of its rim."""

@@ -22,11 +22,3 @@ def test_must_fail(path):
 @pytest.mark.parametrize("path", sorted((SAMPLES / "MUSTPASS").glob("*.3mf")), ids=lambda path: path.stem[9:])
 def test_must_pass(path, strict):
     assert check_file(path, Options(strict_3mf=strict)).verdict != "error"
-
-
-def test_the_corpus_is_there():
-    assert len(list((SAMPLES / "MUSTFAIL").glob("*.3mf"))) == 38
-    assert len(list((SAMPLES / "MUSTPASS").glob("*.3mf"))) == 13
-    assert len(list((CORPUS / "numpy-stl").rglob("*.stl"))) == 16
-    assert (SAMPLES / "LICENSE").is_file()
-    assert (CORPUS / "numpy-stl" / "LICENSE").is_file()

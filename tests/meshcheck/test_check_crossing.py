@@ -1,72 +1,12 @@
 """Self-crossing against an independent reference in fractions, and on solids whose answer is known."""
 
-import time
-from fractions import Fraction
-
 import numpy as np
 import pytest
-from exact_pairs import counts, reference
+from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES, finding
 
-from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs
 from unitcad.meshcheck import check_mesh
-from unitcad.meshcheck.geometry.predicates import (
-    common_point,
-    integers,
-    meet,
-)
-from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import explain
-
-
-@pytest.mark.parametrize("kind", ["grid", "grid sharing a corner", "random", "random sharing a corner"])
-def test_triangles_meet_as_fractions_say(kind):
-    rng = np.random.default_rng(7)
-    corners = rng.integers(-2, 3, (700, 2, 3, 3)).astype(float) if "grid" in kind else rng.normal(size=(700, 2, 3, 3))
-    if "corner" in kind:
-        corners[:, 1, 0] = corners[:, 0, 1]
-    normal = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
-    corners = corners[(np.abs(normal).sum(axis=-1) > 0).all(axis=1)]
-    found = meet(corners[:, 0], corners[:, 1])
-    compared = crossing = 0
-    for i, (a, b) in enumerate(corners):
-        expected = reference(a, b)
-        if expected is None:
-            continue
-        compared += 1
-        crossing += expected[0]
-        assert expected == (bool(found.crosses[i]), bool(found.touches[i])), (a, b)
-    assert compared > 500
-    assert 20 < crossing < compared - 20
-
-
-@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 40), (200, 77), (300, 4)])
-def test_box_pairs_are_all_that_meet(n, m):
-    rng = np.random.default_rng(0)
-    low = rng.random((n + m, 3))
-    places = np.concatenate([low, low + 0.1])
-    steps = frame_of(places).steps(places)
-    rows = np.arange(n + m)
-    both_sets = boxes_of(steps, rows, rows + n + m)
-    boxes, others = both_sets[:n].astype(int), both_sets[n:].astype(int)
-
-    def naive(a, b):
-        return bool((a[:3] <= 65_535 - b[3:]).all() and (b[:3] <= 65_535 - a[3:]).all())
-
-    own = {
-        tuple(sorted(p))
-        for i, j in meeting_pairs(both_sets[:n], Deadline(60).tick)
-        for p in zip(i.tolist(), j.tolist(), strict=True)
-    }
-    assert own == {(a, b) for a in range(n) for b in range(a + 1, n) if naive(boxes[a], boxes[b])}
-    both = {
-        p
-        for i, j in meeting_between(both_sets[:n], both_sets[n:], Deadline(60).tick)
-        for p in zip(i.tolist(), j.tolist(), strict=True)
-    }
-    assert both == {(a, b) for a in range(n) for b in range(m) if naive(boxes[a], others[b])}
-    apart = (low[:n, None] > low[None, n:] + 0.1).any(axis=2) | (low[None, n:] > low[:n, None] + 0.1).any(axis=2)
-    assert both >= {(int(a), int(b)) for a, b in np.argwhere(~apart)}  # steps lose no pair
 
 
 def _codes(*parts):
@@ -144,32 +84,6 @@ def test_crossing_count_equals_brute_force(mesh):
     assert crossing.count == counts(points, faces)[0] > 0
 
 
-def test_one_missing_face_does_not_make_it_slow():
-    """Faces round a vertex are left aside wherever they surround it, hole or no hole elsewhere."""
-    points, faces = _sphere(100)
-    start = time.perf_counter()
-    whole = check_mesh(points, faces)
-    closed = time.perf_counter() - start
-    opened = check_mesh(points, faces[1:])
-    assert whole.findings == ()
-    assert [found.code for found in opened.findings] == ["T001"]
-    assert time.perf_counter() - start - closed < 10 * closed + 0.5
-
-
-def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning():
-    """Warnings are errors here; the coordinates' exponents lie farther apart than a float's range."""
-    values = np.array([[0.0, 1e-320, 10.0]])
-    whole = integers(values).astype(object)[0].tolist()
-    assert whole[0] == 0
-    assert whole[2] * Fraction(1e-320) == whole[1] * 10
-
-
-@pytest.mark.parametrize("code", ["G001", "G002", "P019"])
-def test_rules_that_are_softer_in_some_files_say_so(code):
-    assert "3MF" in explain(code)
-    assert "warning" in explain(code).split("\n", 1)[1]
-
-
 @pytest.mark.parametrize("code", ["G002", "G003"])
 @pytest.mark.parametrize(("shared", "overlap"), [(0.0, False), (0.9e-6, False), (1.1e-6, True)])
 def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code, shared, overlap):
@@ -215,22 +129,3 @@ def test_touching_shells_are_placed_pair_by_pair():
     report = check_mesh(np.concatenate(boxes), np.concatenate([CUBE_FACES + 8 * k for k in range(4)]))
     places = finding(report, "G003").locations
     assert sorted(place.xyz[0] for place in places if place.xyz) == pytest.approx([10, 20, 30])
-
-
-@pytest.mark.parametrize(
-    ("other", "expected"),
-    [
-        ([[1, 1, -1], [1, 1, 1], [1, -9, 0]], (1, 0.5, 0)),  # a segment from the edge y = 0 to (1, 1, 0)
-        ([[2, 2, 0], [2, 2, 5], [9, 2, 5]], (2, 2, 0)),  # a corner on the inside
-        ([[0, 0, 0], [0, 0, 3], [6, 0, 3]], (0, 0, 0)),  # a common corner
-        ([[0, 0, 0], [6, 0, 0], [0, 0, 3]], (3, 0, 0)),  # a common edge
-        ([[1, 1, 0], [2, 1, 0], [1, 2, 0]], (4 / 3, 4 / 3, 0)),  # in one plane, inside
-        ([[0, 0, 1], [1, 0, 1], [0, 1, 1]], None),
-    ],
-)
-@pytest.mark.parametrize("scale", [1.0, 1e38, 1e-150])
-def test_the_middle_of_what_two_triangles_share(other, expected, scale):
-    found = common_point(*(scale * np.array(corners) for corners in ([[0, 0, 0], [6, 0, 0], [0, 6, 0]], other)))
-    assert (found is None) == (expected is None)
-    if found is not None and expected is not None:
-        assert np.array(found) / scale == pytest.approx(expected, abs=1e-7)

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turned
-
-Points = np.ndarray
+from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, finding, in_format, stl, turned
 
 
 def severities(report):
@@ -45,15 +43,6 @@ def test_turned_boxes_overlap_as_those_that_stand(seed, judge):
     both = {depth: np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]) for depth in (0.001, 0.5)}
     found = [severities(judge(stl(turned(body, seed, shift=20)))) for body in both.values()]
     assert [set(codes.values()) for codes in found] == [{"warning"}, {"error"}]
-
-
-def test_the_message_says_the_depth(judge):
-    (crossing,) = [
-        found
-        for found in judge(stl(np.concatenate([box(), box((6, 6, 10), (2, 2, 9.995))]))).findings
-        if found.code == "G001"
-    ]
-    assert crossing.message.endswith("that cross, 0.005 mm deep at most")
 
 
 @pytest.mark.parametrize("times", [0, 3, 5])
@@ -127,3 +116,8 @@ def test_a_file_of_faces_without_area_only_has_no_volume(judge):
     report = judge(stl(np.array([line, line[::-1]])))
     assert report.has("G007")
     assert report.verdict == "error"
+
+
+def test_the_message_says_the_depth(judge):
+    report = judge(stl(np.concatenate([box(), box((6, 6, 10), (2, 2, 9.995))])))
+    assert finding(report, "G001").message.endswith("that cross, 0.005 mm deep at most")

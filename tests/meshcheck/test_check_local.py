@@ -31,30 +31,6 @@ def _sheet():
     return np.array([[a, b, d], [b, c, d], [c, a, d], [a, c, b]])
 
 
-@pytest.mark.parametrize("width", [0.2, 0.002])
-def test_a_slit_is_no_seam_whatever_lies_beside_it(width):
-    """A box of 50 mm with a strip of its top missing: wider than 1e-5 of the box's diagonal of 87 mm."""
-    left, right = 25 - width / 2, 25 + width / 2
-    x = [0, left, right, 50]
-    top = [[[x[k], 0, 50], [x[k + 1], 0, 50], [x[k + 1], 50, 50], [x[k], 50, 50]] for k in (0, 2)]
-    sides = []
-    for y, order in ((0, 1), (50, -1)):
-        ring = [[0, y, 0], [50, y, 0], [50, y, 50], [right, y, 50], [left, y, 50], [0, y, 50]]
-        for a, b, c in ([0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]):
-            sides.append([ring[a], ring[b], ring[c]][::order])
-    bottom = [[0, 0, 0], [0, 50, 0], [50, 50, 0], [50, 0, 0]]
-    ends = [[[0, 0, 0], [0, 0, 50], [0, 50, 50], [0, 50, 0]], [[50, 0, 0], [50, 50, 0], [50, 50, 50], [50, 0, 50]]]
-    for side in (*top, bottom, *ends):
-        sides += [[side[0], side[1], side[2]], [side[0], side[2], side[3]]]
-    slit = np.array(sides, float)
-    assert codes(check_bytes(stl(slit), "a.stl")) == {"T001"}
-    assert codes(check_bytes(stl(np.concatenate([slit, BEAM + np.array([0, 100, 0])])), "a.stl")) == {"T001"}
-    closed = slit.copy()
-    closed[(slit == left) | (slit == right)] = 25
-    kept = np.linalg.norm(np.cross(closed[:, 1] - closed[:, 0], closed[:, 2] - closed[:, 0]), axis=1) > 0
-    assert codes(check_bytes(stl(closed[kept]), "a.stl")) == set()
-
-
 @pytest.mark.parametrize(("gap", "closes"), [(0.9e-5, True), (1.1e-5, False)])
 @pytest.mark.parametrize("company", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 0.02, 300.0])

@@ -8,7 +8,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import xml.etree.ElementTree as ET
 import zipfile
 
@@ -185,16 +184,3 @@ def test_a_folder_that_cannot_be_written_is_one_error(tmp_path):
     for jobs in ("1", "2"):
         result = run("a.stl", "a.stl", "--pictures", "p", "--jobs", jobs, cwd=tmp_path)
         assert (result.returncode, len(result.stderr.splitlines())) == (2, 1)
-
-
-def test_nothing_of_cad_and_no_display_is_needed(tmp_path):
-    (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
-    code = (
-        "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'check', 'a.stl', '--pictures', 'p']\n"
-        "try:\n    main()\nexcept SystemExit as stop:\n    assert stop.code == 1, stop.code\n"
-        "heavy = {'OCP', 'build123d', 'cadquery', 'matplotlib'} "
-        "& {m.split('.')[0] for m in sys.modules}\nassert not heavy, heavy"
-    )
-    bare = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, env=bare, timeout=120)
-    assert (tmp_path / "p" / "a.stl" / "T001.svg").is_file()

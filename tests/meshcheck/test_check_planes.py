@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from unitcad.meshcheck.geometry.crossings import _flush
 from unitcad.meshcheck.geometry.mesh import area_vectors
 from unitcad.meshcheck.geometry.predicates import meet
 from unitcad.meshcheck.geometry.sieves import planes_of
@@ -55,31 +54,3 @@ def test_what_a_plane_sets_apart_is_apart(kind):
     meets = exact.touches | exact.crosses | exact.overlaps
     assert not (meets & by_plane[whole]).any()
     assert by_plane[whole].sum() > 100
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("shared", [1, 2])
-def test_faces_that_share_corners_have_no_more_in_common(kind, shared):
-    """No crossing and no common area; of faces at one edge the third corner is off the plane or across the edge."""
-    a, b = _pairs(kind, np.random.default_rng([shared, KINDS.index(kind)]))
-    b[:, :shared] = a[:, :shared]
-    planes, i = _planes(a, b), np.arange(N)
-    count = np.full(N, shared, np.int8)
-    found = planes.one_side(i, planes.vertices(i + N), count)
-    solid = (planes.normal != 0).any(axis=0)
-    rows = np.flatnonzero(found & solid[:N] & solid[N:])
-    exact = meet(a[rows], b[rows])
-    assert len(rows) > N / 20
-    assert not (exact.crosses | exact.overlaps).any()
-    if shared == 2:  # the third corner is off the plane, or in it and across the edge
-        assert ((exact.side_b != 0).sum(axis=1) <= 1).all()
-
-
-def test_faces_on_both_sides_of_a_level_plane_do_no_more_than_touch():
-    """On a lattice, where most boxes have sides in common."""
-    a, b = _pairs("lattice", np.random.default_rng(7))
-    found = _flush(a.transpose(1, 2, 0), b.transpose(1, 2, 0))
-    solid = [(area_vectors(c.reshape(-1, 3), np.arange(3 * N).reshape(-1, 3)) != 0).any(axis=1) for c in (a, b)]
-    exact, rows = meet(a, b), found & solid[0] & solid[1]
-    assert (rows & exact.touches).sum() > 20
-    assert not (rows & (exact.crosses | exact.overlaps)).any()

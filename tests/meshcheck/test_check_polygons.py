@@ -1,11 +1,9 @@
 """Polygons of PLY, OBJ and OFF: faces of differing sizes, concave ones, bent ones, and where they stand."""
 
-import io
 import itertools
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from polygon_files import every_way, obj, off, ply
@@ -166,22 +164,6 @@ def test_any_polygons_keep_their_corners_and_area_in_every_format(corners, drawn
         for polygon, face in enumerate(faces):
             used = found.vertices[found.faces[of == polygon]].reshape(-1, 3)
             assert {tuple(p) for p in used.tolist()} <= {tuple((points[i] + 0.0).tolist()) for i in face}
-
-
-@settings(max_examples=40, deadline=None)
-@given(corners=POINTS, drawn=st.lists(st.lists(st.integers(0, 8), min_size=3, max_size=3), min_size=1, max_size=9))
-def test_triangles_are_those_that_trimesh_reads(corners, drawn):
-    points = np.array(corners, float)
-    faces = [[i % len(points) for i in face] for face in drawn]
-    for name in ("little.ply", "text.ply", "plain.obj", "plain.off"):
-        content = every_way(points, faces)[name]
-        ours = read(name, content)
-        theirs = trimesh.load(
-            io.BytesIO(content), file_type=name.rpartition(".")[2], process=False, maintain_order=True
-        )
-        assert isinstance(theirs, trimesh.Trimesh)
-        found = ours.vertices[ours.faces]
-        np.testing.assert_array_equal(found, np.asarray(theirs.vertices)[np.asarray(theirs.faces)] + 0.0)
 
 
 @pytest.mark.parametrize(("coordinate", "count", "index"), list(itertools.product(

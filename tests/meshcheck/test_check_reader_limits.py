@@ -1,7 +1,5 @@
 """What readers cost: time that grows with the file, memory that grows with its vertices and faces alone."""
 
-import subprocess
-import sys
 import time
 import tracemalloc
 
@@ -98,19 +96,3 @@ def test_memory_is_a_few_times_the_meshs(file):
     content = {"a.obj": obj(points, faces), "a.off": off(points, faces), "text.ply": ply(points, faces, ""),
                "a.ply": ply(points, faces)}[file]  # fmt: skip
     assert peak(file, content) < 500 * len(faces) + 60 * 200_000
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="address space is bounded on Linux only")
-def test_an_obj_of_many_materials_is_judged_in_little_address_space(tmp_path):
-    """200 materials over 90,000 vertices took 1 GB where each had its own."""
-    points, faces = grid(300)
-    head, _, rows = obj(points, faces).partition(b"\nf")
-    lines = rows.split(b"\nf")
-    content = head + b"".join(b"\nusemtl m%d\nf" % (i * 200 // len(lines)) + line for i, line in enumerate(lines))
-    (tmp_path / "a.obj").write_bytes(content)
-    code = (
-        "from unitcad.cli import main; import sys; "
-        "sys.argv = ['unitcad', 'check', 'a.obj', '--memory', '900', '--select', 'F']; main()"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stdout.splitlines()[-1:], done.stderr) == (0, ["1 file: 1 passed"], "")

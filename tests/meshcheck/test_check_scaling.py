@@ -96,3 +96,8 @@ def test_slivers_and_doubled_faces(work):
     done = work((points, np.concatenate([faces, faces[::3] + len(again)])))
     assert done["decided"] > 1
     assert done["integers"] < 0.01
+
+
+def test_one_missing_face_makes_no_more_work(work):
+    points, faces = plate(5)
+    assert work((points, faces[1:]))["sieved"] < 1.1 * work((points, faces))["sieved"] + 0.1

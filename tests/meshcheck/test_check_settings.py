@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from shapes import box, package, stl
+from shapes import box, model_xml, package, stl
 from test_check_command import run
 
 HOLE, WARN, FILM = stl(box()[2:]), stl(box(), header=b"solid"), stl(box((20, 20, 0.35)))
@@ -88,21 +88,11 @@ def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folde
     for key, option, low, high in (("max-faces", "--max-faces", "5", "100"), ("timeout", "--timeout", "0.001", "600")):
         set_, beaten = both(f"{key} = {low}", film, option, high)
         assert (codes(set_)["film.stl"], codes(beaten)["film.stl"]) == (["F011"], [])
-    (folder / "a.3mf").write_bytes(package(types=None))
+    (folder / "a.3mf").write_bytes(package(model_xml(attributes='unit="millimeter" vendor="x"')))
+    set_, beaten = both("3mf-strict = true", "a.3mf", "--no-3mf-strict")
+    assert (set_.returncode, beaten.returncode) == (1, 0)
     both("memory = 4000", film)
     assert run("sub/deep/film.stl", "--no-config", cwd=folder).returncode == 0
-
-
-def test_3mf_strict_in_settings(folder):
-    thumbnail = '<metadata name="odd">x</metadata>'
-    from shapes import model_xml
-
-    (folder / "a.3mf").write_bytes(package(model_xml(before=thumbnail, attributes='unit="millimeter" vendor="x"')))
-    loose = json.loads(run("a.3mf", "--json", cwd=folder).stdout)["files"][0]["verdict"]
-    (folder / "unitcad.toml").write_text("[check]\n3mf-strict = true\n")
-    strict = json.loads(run("a.3mf", "--json", cwd=folder).stdout)["files"][0]["verdict"]
-    beaten = json.loads(run("a.3mf", "--json", "--no-3mf-strict", cwd=folder).stdout)["files"][0]["verdict"]
-    assert (loose, strict, beaten) == ("warning", "error", "warning")
 
 
 @pytest.mark.parametrize(

@@ -88,23 +88,6 @@ def test_signs_are_those_of_fractions(kind, single):
         assert flat[i] == (area > 0) - (area < 0)
 
 
-@pytest.mark.parametrize("kind", ["slivers", "on a plane of short numbers"])
-def test_numbers_of_single_precision_need_no_integers_of_python(kind, monkeypatch):
-    """They cost ten times as much as the rest, and most mesh files have single precision."""
-    rows = 0
-
-    def counted(values):
-        nonlocal rows
-        rows += values.shape[-1]
-        return whole(values)
-
-    whole = predicates.integers
-    monkeypatch.setattr(predicates, "integers", counted)
-    p = _points(kind, np.random.default_rng(8))
-    orient3d(*p.astype(np.float32).astype(np.float64))
-    assert rows == 0
-
-
 def _next_to_parallel(seed):
     """Whole numbers p, q, r, s of 40 bits and their determinant p s - q r, which is -1, 0 or 1."""
     rng = random.Random(seed)

@@ -1,74 +1,15 @@
 """Edges, shells and welds against plain Python on random meshes."""
 
-import sys
 from collections import defaultdict
 
 import numpy as np
 import pytest
 from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from shapes import CUBE_CORNERS, CUBE_FACES, box, finding, stl, surface
 
-from unitcad.geometry.components import components
 from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.geometry import topology
 from unitcad.meshcheck.geometry.mesh import weld_exact
-
-
-def _random_faces(seed, n_vertices, n_faces):
-    rng = np.random.default_rng(seed)
-    faces = rng.integers(0, n_vertices, (n_faces * 2, 3)).astype(np.int32)
-    keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return faces[keep][:n_faces]
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_edges_are_counted_as_a_dictionary_counts_them(seed):
-    faces = _random_faces(seed, 12, 20)
-    ends, counted = np.unique(np.sort(np.stack(topology.half_edges(faces)), axis=0), axis=1, return_counts=True)
-    edges = topology.edges_of(faces, 12)
-    order = np.lexsort((edges.high, edges.low))
-    found = np.stack([edges.low, edges.high, edges.size])[:, order]
-    assert (found == np.vstack([ends, counted])).all()
-
-
-@pytest.mark.parametrize(("n_vertices", "n_faces"), [(12, 0), (12, 20), (90, 4000), (70_000, 60_000)])
-def test_edges_are_sorted_by_their_ends(n_vertices, n_faces):
-    faces = _random_faces(1, n_vertices, n_faces)
-    start, end = topology.half_edges(faces)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.lexsort((np.arange(len(low)), high, low))
-    for room in (n_vertices, 2**31):  # packed into words, and by two keys
-        found = topology._sorted_edges(faces, room)
-        for array, expected in zip(found, (order, low[order], high[order]), strict=True):
-            assert array.dtype == np.int32
-            assert (array == expected).all()
-
-
-@pytest.mark.parametrize("n", [1, 5, 300, 70_000])
-def test_components_as_a_search_finds_them(n):
-    rng = np.random.default_rng(n)
-    left, right = rng.integers(0, n, (2, n // 2 + 1))
-    label = components(n, left, right)
-    pairs = coo_array((np.ones(len(left)), (left, right)), (n, n))
-    assert (label == connected_components(pairs, directed=False)[1]).all()
-
-
-@pytest.mark.parametrize("n", [200, 600])
-def test_near_points_are_those_of_all_pairs_and_a_crowd_has_none(n, monkeypatch):
-    """Few points need no scipy, which takes longer to load than they take."""
-    rng = np.random.default_rng(n)
-    points = np.concatenate([some := rng.random((n, 3)) * 100, some + rng.normal(size=some.shape) * 1e-4])
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    reaches = [2e-4, 1e-3]
-    if n == 200:
-        monkeypatch.setitem(sys.modules, "scipy.spatial", None)  # importing it fails
-        reaches.append(distance[0, n])  # that of a pair itself
-    for reach in reaches:
-        expected = np.argwhere(np.triu(distance <= reach, 1)).tolist()
-        assert sorted(np.sort(topology._within(points, reach)).tolist()) == expected != []
-    assert len(topology._within(points * 1e-5, 1e-2)) == 0
 
 
 @pytest.mark.parametrize("collisions", [False, True])

@@ -6,7 +6,6 @@ from faulty_sets import set_of, with_fault
 
 from unitcad.casting.procedure import procedure
 from unitcad.catalogue import materials
-from unitcad.checks import check_moulds
 from unitcad.checks.balance import findings as balance
 from unitcad.designs.dimensions import growth
 from unitcad.errors import Refusal
@@ -17,20 +16,6 @@ from unitcad.validation import load
 
 SHRUNK = ("encapsulating", "moulds.shrinkage_percent=2")
 WIDER = ("encapsulating", "moulds.bore_compensation_mm=0.1")
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        (*SHRUNK, "motor.lip_mm=0.5", "skin_mm=0.5"),
-        ("embedded", "moulds.shrinkage_percent=0.3", "moulds.cavities=[2,2]"),
-        (*WIDER, "moulds.draft_deg=1"),
-        ("pass-through", "moulds.bore_compensation_mm=0.2", "moulds.printer=sla", "moulds.pour=injected"),
-    ],
-    ids=" ".join,
-)
-def test_every_mould_check_holds(source):
-    assert [finding for finding in check_moulds(set_of(*source)) if not finding.ok] == []
 
 
 def test_tools_are_larger_by_the_shrinkage_and_the_unit_is_not():
@@ -86,20 +71,6 @@ def test_bores_are_wider_in_the_files_alone(tmp_path):
     assert built.manifest["compensation"] == {"shrinkage_percent": 0.0, "bore_compensation_mm": 0.1}
     assert built.manifest["check"]["errors"] == 0
     assert set_of(*WIDER).plan.label != set_of("encapsulating").plan.label
-
-
-@pytest.mark.parametrize(
-    ("source", "changes", "field", "nearest"),
-    [
-        ("encapsulating", ["moulds.shrinkage_percent=6"], "moulds.shrinkage_percent", 5),
-        ("encapsulating", ["moulds.bore_compensation_mm=0.4"], "moulds.bore_compensation_mm", 0.2),
-    ],
-)
-def test_refused_with_a_value_that_is_accepted(source, changes, field, nearest):
-    with pytest.raises(Refusal) as refused:
-        load(source, changes)
-    assert (refused.value.field, refused.value.nearest) == (field, pytest.approx(nearest))
-    load(source, [f"{field}={refused.value.nearest}"])
 
 
 def test_moulds_of_other_kinds_refuse_what_they_do_not_draw():

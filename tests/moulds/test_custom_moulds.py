@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from faulty_sets import broken, mesh_findings, of_spec, set_of
+from faulty_sets import broken, mesh_findings, of_spec
 
 from unitcad.casting.procedure import procedure
 from unitcad.casting.procedure_text import to_markdown
-from unitcad.checks import check_moulds, mould_checks, opening
+from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import printing
 from unitcad.kernels.mesh import arrays, realise
@@ -152,24 +152,6 @@ def test_a_layer_below_its_rim_has_no_opening(tmp_path):
         moulds_of(tmp_path, code, layers=2)
 
 
-def test_c410_measures_the_opening():
-    """A cavity that ends in a point, as a design's own tooling might leave it."""
-    moulds = set_of("single-embedded")
-    (cavity,) = moulds.cavities
-    cone = realise(Revolve(polygon((0, 0), (7, 0), (0, 2))), 96)
-    found = [f for f in opening.CHECK.findings(_with_cavity(moulds, cavity._replace(reached=cone))) if not f.ok]
-    assert [finding.where for finding in found] == [
-        "pour 1: opening at the rim, area",
-        "pour 1: opening at the rim, width",
-    ]
-    assert "no room to pour" in found[0].advice
-
-
-def _with_cavity(moulds, cavity):
-    moulds.__dict__["cavities"] = [cavity]
-    return moulds
-
-
 @pytest.mark.parametrize(
     ("drawn", "layers", "why"),
     [
@@ -200,7 +182,7 @@ def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path):
 
     hollow = cap(9.5, 2.5, (9.5 * arc[-1][0], 10), (0, 10))
     gel = cut(cap(12, 0, (13, 6), (13, 9), (0, 9)), [hollow])
-    (tmp_path / "gel.stl").write_bytes(printing.stl(*arrays(realise(gel, 96)), "gel"))
+    (tmp_path / "gel.stl").write_bytes(printing.stl(*arrays(realise(gel, 32)), "gel"))
     spec = tmp_path / "spec.toml"
     keys = 'name = "gel"\ndesign = "gel.stl"\ndiameter_mm = 26.0\nmotor = false\n'
     spec.write_text(f'{keys}{LAYER}[moulds]\npour = "injected"\n')
@@ -210,7 +192,7 @@ def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path):
     (step,) = moulds.plan.steps
     assert moulds.hung(step) == pytest.approx(6.5, abs=1e-3)
     below = moulds.solids["lid1"].trim_by_plane((0, 0, -1), -9 + 1e-6)
-    room = realise(hollow, 96).trim_by_plane((0, 0, -1), -9)
+    room = realise(hollow, 32).trim_by_plane((0, 0, -1), -9)
     assert max(piece.volume() for piece in below.decompose() if piece.genus() == 0) == pytest.approx(
         room.volume(), rel=1e-3
     )

@@ -92,10 +92,11 @@ def test_command_writes_a_folder(tmp_path):
     assert first == {file.name: file.read_bytes() for file in Path(output["folder"]).iterdir()}
 
 
-def test_resin_coupon_prints_no_tongue(tmp_path):
-    from unitcad.casting.coupon import write
-
-    assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
+def test_resin_coupon_prints_no_tongue_and_says_how_to_cut_it(tmp_path):
+    assert not (coupon.write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
+    text = coupon.Coupon(printers()["sla"]).markdown()
+    assert "cut a strip 3.4 mm wide" in text
+    assert "0.35 mm thick" in text
 
 
 @pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
@@ -109,9 +110,3 @@ def test_windows_end_whole_layers_and_keep_the_clearance(name):
         assert coupon.WINDOW_Z - low >= clearance - 1e-9
         assert high - coupon.WINDOW_Z - thick >= clearance - 1e-9
     assert "differ only in width" in coupon.Coupon(printer).markdown()
-
-
-def test_resin_coupon_says_how_to_cut_the_tongue():
-    text = coupon.Coupon(printers()["sla"]).markdown()
-    assert "cut a strip 3.4 mm wide" in text
-    assert "0.35 mm thick" in text

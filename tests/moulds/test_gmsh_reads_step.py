@@ -31,9 +31,8 @@ def read(path):
     return [float(number) for number in re.findall(r"^volume (\S+)$", done.stdout + done.stderr, re.M)]
 
 
-@pytest.mark.parametrize("name", ["encapsulating", "embedded"])
-def test_same_solids_and_volumes(name, tmp_path):
-    variant = Variant(load(name, ["output.formats=['step']"]))
+def test_same_solids_and_volumes(tmp_path):
+    variant = Variant(load("encapsulating", ["output.formats=['step']"]))
     folder = build(variant.spec, tmp_path, only=("unit", "moulds"), check=False).folder
     there = [read((folder / file).resolve()) for file in ("unit.step", "moulds/moulds.step")]
     assert [len(volumes) for volumes in there] == [len(variant.unit), len(variant.plan.tools)]

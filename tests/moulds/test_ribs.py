@@ -63,7 +63,7 @@ def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press():
     moulds = set_of("embedded", "moulds.cavities=[2,2]")
     standing, depth = ribs(moulds.spec, moulds.plan.layout), 0.1
     rng, worst = np.random.default_rng(3), 0.0
-    for strengths in rng.choice((1 - UNEVEN, 1 + UNEVEN), (40, len(standing))):
+    for strengths in rng.choice((1 - UNEVEN, 1 + UNEVEN), (15, len(standing))):
         x = y = turn = 0.0
         for _ in range(4000):
             fx = fy = moment = 0.0

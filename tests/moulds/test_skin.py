@@ -17,7 +17,7 @@ from unitcad.checks.balance import findings as balance
 from unitcad.errors import Refusal
 from unitcad.pipeline.write import build
 from unitcad.shape import cut, cylinder, moved, union
-from unitcad.validation import load, templates, warnings
+from unitcad.validation import load, warnings
 
 SETS = [
     ("encapsulating", "skin_mm=0.5"),
@@ -83,11 +83,6 @@ def test_the_procedure_ends_with_the_skin(source):
 def test_a_fault_in_the_tray_breaks_balance(fault):
     faulty = with_fault(set_of("encapsulating", "skin_mm=0.5"), "skin-tray", fault)
     assert [f.where for f in balance(faulty) if not f.ok] == ["skin-tray cell 1"]
-
-
-def test_without_a_skin_there_is_no_tray():
-    for name in templates():
-        assert "skin-tray" not in {tool.name for tool in set_of(name).plan.tools}
 
 
 def test_refused_with_a_value_that_is_accepted():

@@ -138,12 +138,6 @@ def test_the_slicer_draws_a_cup_s_ribs(name, tmp_path):
     assert face - min(tips) == pytest.approx(moulds.spec.moulds.rib_interference_mm, abs=0.01)
 
 
-@pytest.mark.smoke
-def test_durations():
-    assert slicer._seconds("1d 2h 3m 4s") == 93784
-    assert slicer._seconds("58s") == 58
-
-
 def test_coupon_needs_no_repair(tmp_path):
     for body in coupon.Coupon(printers()["fdm-0.4"]).bodies():
         file = tmp_path / f"{body.name}.stl"

@@ -20,17 +20,6 @@ def flooded(edges, height, opening):
     return found.tolist()
 
 
-def test_air_goes_over_the_higher_of_two_saddles():
-    """Tops at 5, 7 and 6 with saddles at 2 and 3 between them; the opening is the last."""
-    height = np.array([5.0, 2.0, 7.0, 3.0, 6.0])
-    edges = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
-    opening = np.array([False, False, False, False, True])
-    assert _ways_out(edges, height, opening).tolist() == [2.0, 2.0, 3.0, 3.0, 6.0]
-    beside = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [0, 4]])
-    assert _ways_out(beside, height, opening).tolist() == [5.0, 2.0, 3.0, 3.0, 6.0]
-    assert _ways_out(edges, height, ~opening & False).tolist() == [-np.inf] * 5
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_the_ways_out_are_those_of_flooded_levels(seed):
     pick = random.Random(seed)
