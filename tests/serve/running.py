@@ -41,7 +41,8 @@ class Server:
             with urllib.request.urlopen(request, timeout=120) as answer:
                 return answer.status, answer.read(), dict(answer.headers)
         except urllib.error.HTTPError as error:
-            return error.code, error.read(), dict(error.headers)
+            with error:
+                return error.code, error.read(), dict(error.headers)
 
     def ask(self, text, what="unit", edits=None):
         """Ask about a text; returns the answer."""

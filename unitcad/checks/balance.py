@@ -47,8 +47,10 @@ def _of_cavity(cavity: Cavity, facets: float) -> Iterator[MouldFinding]:
     drawn, reached = cavity.drawn, cavity.reached
     # The difference, both ways.
     differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
-    if facets and differ > BALANCE * drawn.volume():
-        differ = sum(piece.volume() for rest in (reached - drawn, drawn - reached) for piece in thick_pieces(rest))
+    if differ > BALANCE * drawn.volume():
+        # Of solids that are alike but for a rounding, the intersection can be larger than either: a second opinion.
+        rests = reached - drawn, drawn - reached
+        differ = sum(piece.volume() for rest in rests for piece in (thick_pieces(rest) if facets else [rest]))
     yield at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
 
 

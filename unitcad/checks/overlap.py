@@ -143,8 +143,8 @@ def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding
 def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
     """Return the volume that two solids share, mm3, without films up to `facets` thick.
 
-    If faces coincide the mesh kernel now and then keeps a part that is not shared, but only in one order of the two, so
-    a finding needs both orders. `other` is cut first: a cup and then the base take half as long that way.
+    If faces coincide the mesh kernel now and then keeps a part that is not shared, but not in each order of the two and
+    not in their difference, so a finding needs all three. `other` is cut first: it takes half as long.
     """
     shared = other ^ one
     volume = float(shared.volume())
@@ -152,7 +152,7 @@ def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
         return volume
     if facets:
         return sum(float(piece.volume()) for piece in thick_pieces(shared, facets))
-    return min(volume, float((one ^ other).volume()))
+    return min(volume, float((one ^ other).volume()), float(one.volume() - (one - other).volume()))
 
 
 class _Volumes:

@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
-from pathlib import PurePath
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -296,10 +296,9 @@ def _inside(path: str) -> str:
 
 def _uri(path: str) -> str:
     """Return a relative path as a URI reference; an absolute one as a file: URI."""
-    pure = PurePath(path)
-    if pure.is_absolute():
-        return pure.as_uri()
-    return quote(pure.as_posix().encode("utf-8", "surrogateescape"), safe="/")
+    if Path(path).is_absolute():
+        return Path(path).as_uri()
+    return quote(Path(path).as_posix().encode("utf-8", "surrogateescape"), safe="/")
 
 
 FORMATS = ("text", "json", "github", "sarif", "junit", "markdown")

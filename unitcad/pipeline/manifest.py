@@ -3,8 +3,6 @@
 A later version may add keys; those that are here keep their names.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
