@@ -312,7 +312,8 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
         _check_closes(asked, table, sheet, middle, apart)
     _check_apart(way, points, units, kind, table, middle)
     given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
-    for n, angle in given.items() if not way.own_tails else ():
+    if given and not way.own_tails:
+        n, angle = next(iter(given.items()))
         raise Refusal(f"place.{places[n]}.angle_deg", angle, "turns a unit's own tail, and these units have none")
     placed = [
         Placed(name=p.name, x=p.x, y=p.y, angle_deg=float(given.get(n) or 0.0), unit=units[n])

@@ -296,9 +296,10 @@ def _inside(path: str) -> str:
 
 def _uri(path: str) -> str:
     """Return a relative path as a URI reference; an absolute one as a file: URI."""
-    if Path(path).is_absolute():
-        return Path(path).as_uri()
-    return quote(Path(path).as_posix().encode("utf-8", "surrogateescape"), safe="/")
+    file = Path(path)
+    if file.is_absolute():
+        return file.as_uri()
+    return quote(file.as_posix().encode("utf-8", "surrogateescape"), safe="/")
 
 
 FORMATS = ("text", "json", "github", "sarif", "junit", "markdown")

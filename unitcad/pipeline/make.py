@@ -61,8 +61,8 @@ from unitcad.spec.raw import Format
 from unitcad.validation import from_data
 
 MESH_FORMATS = ("stl", "3mf")
-DRAWING = "drawing.pdf"
 """The formats whose files the mesh rules look at."""
+DRAWING = "drawing.pdf"
 
 
 @dataclass
@@ -135,7 +135,7 @@ class Subject:
 
     def key(self, only: Sequence[str], check: bool) -> str:
         """Return the key under which variants share their making."""
-        return build_key(MouldSet(self.of), only, check)
+        return build_key(self.moulds, only, check)
 
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
         """Return the outputs of `only` that this subject has."""
