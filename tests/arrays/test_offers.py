@@ -203,3 +203,11 @@ def test_the_name_that_was_meant_is_offered_before_another_one():
     with pytest.raises(Refusal) as refused:
         load_array("forearm-patch", {"array": "pocket"})
     assert (refused.value.limit.partition("; [")[0], refused.value.nearest) == (limit, nearest)
+
+
+@pytest.mark.parametrize("layout", [{"kind": "banana", "count": 5}, {"kind": "rong", "cuont": 5}])
+def test_an_unknown_kind_of_layout_draws_no_faults_of_another_kind(layout):
+    """The keys of a grid, which is tried in its place, are neither missing nor are the typed ones unknown."""
+    refusal = refusal_of({**_SHEET, "name": "a", "layout": layout, "limb": {"radius_mm": 40}})
+    assert refusal.field == "layout.kind"
+    assert refusal.others == ()

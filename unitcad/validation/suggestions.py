@@ -119,12 +119,13 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
     gone. `sound`: see `suggest`.
     """
     typed: list[tuple[Refusal, Changes]] = []
-    renamed = False
+    renamed: tuple[str, ...] = ()  # tables in which another word, as of a kind, may make other keys necessary
     for refusal, passed in _refusals(data, judge, sound):
-        derived = refusal.value is None and refusal.nearest is not None  # a key that another word makes necessary
-        if not typed or (_is_wrong_by_itself(refusal, data, judge, sound) and not (renamed and derived)):
+        derived = (refusal.value is None or isinstance(refusal, UnknownKey)) and refusal.field.startswith(renamed)
+        if not typed or (_is_wrong_by_itself(refusal, data, judge, sound) and not derived):
             typed.append((refusal, passed))
-        renamed = renamed or (isinstance(refusal.value, str) and isinstance(passed.get(refusal.field), str))
+        if isinstance(refusal.value, str) and isinstance(passed.get(refusal.field), str):
+            renamed += (refusal.field.rpartition(".")[0],)
     if len(typed) > 1 and (culprit := culprit_of(data, judge, sound)):
         first = typed[0][0]
         if first.field in culprit:
