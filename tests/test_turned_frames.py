@@ -22,9 +22,7 @@ from unitcad.kernels import bounds, mesh
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Removal, base_piece
 from unitcad.moulds.plan import Step
-from unitcad.moulds.surroundings import crop
 from unitcad.shape import Common, box, cut, cylinder, exact_volume, moved, ring, rotated, union
-from unitcad.shape.column import Column, Standing
 from unitcad.shape.tree import Body
 from unitcad.validation import load
 
@@ -128,16 +126,3 @@ def test_the_kernels_agree_at_any_slant(slant, at):
         assert abs(solid.volume() - true.volume) <= bounds.volume_bound(shape, SEGMENTS) + 1e-9 * true.volume
         for found, exact in zip(solid.bounding_box(), true.box, strict=True):
             assert abs(found - exact) <= allowed + 1e-5
-
-
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_what_a_column_is_told_to_hold_is_what_turned_solids_have_there(axis):
-    """The reduced trees fill the column as the whole does; an upright tree would keep its corners and lose the rest."""
-    for degrees in (7.0, 30.0, 63.3, 141.0):
-        tree = union((rotated(box(-12, 12, -1, 1, -1, 1), axis, degrees), rotated(moved(CORE, 9), axis, -degrees)))
-        for x, y in ((0.0, 0.0), (6.0, 5.0), (-8.0, 2.0)):
-            column = Column(x, y, 3.0)
-            whole = crop(mesh.realise(tree, SEGMENTS), column).translate((-x, -y, 0))
-            parts = [mesh.realise(part, SEGMENTS) for part in Standing([tree]).within(column)]
-            told = crop(Manifold.compose(parts), Column(0, 0, 3.0)) if parts else Manifold()
-            assert abs(whole.volume() + told.volume() - 2 * (whole ^ told).volume()) < 1e-6

@@ -14,7 +14,7 @@ from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
 from unitcad.export.printing import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.column import extent
+from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, motor_of
 from unitcad.text import cell, number

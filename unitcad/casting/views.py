@@ -48,7 +48,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
 from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, ring, union
-from unitcad.shape.column import extent
+from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
 from unitcad.text import number
 

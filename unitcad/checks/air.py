@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavity
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.geometry.components import components
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.cavities import Cavity
@@ -43,7 +43,7 @@ class Pocket:
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the deepest pocket of every cavity over the five attitudes."""
-    return each_cavity(moulds, lambda cavity: [_of_cavity(cavity, deepest(moulds.spec, cavity.step.index - 1))])
+    return (_of_cavity(cavity, deepest(moulds.spec, cavity.step.index - 1)) for cavity in moulds.cavities)
 
 
 def _of_cavity(cavity: Cavity, limit: float) -> MouldFinding:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavity
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.designs.dimensions import growth
 from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.lid import films
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import cylinder, moved
-from unitcad.shape.column import extent
+from unitcad.shape.extent import extent
 
 SHRUNK = 2e-4
 """Share of a length by which cast and cured layer may differ after shrinking: the grid moves either by 1/2048 mm."""
@@ -23,7 +23,8 @@ SHRUNK = 2e-4
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Compare the space that silicone can reach with the layer, in every cavity, and with the film in a skin's tray."""
-    yield from each_cavity(moulds, lambda cavity: _of_cavity(cavity, moulds.facets))
+    for cavity in moulds.cavities:
+        yield _of_cavity(cavity, moulds.facets)
     if moulds.spec.moulds.shrinkage_percent:
         for step in moulds.plan.steps:
             cast, cured = moulds.mesh_of(step.layer[0]).volume(), moulds.solids[step.name].volume()
@@ -43,7 +44,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             yield at_most("C100", f"{tray.name} cell {i}", differ / film.volume(), BALANCE, "share of the film")
 
 
-def _of_cavity(cavity: Cavity, facets: float) -> Iterator[MouldFinding]:
+def _of_cavity(cavity: Cavity, facets: float) -> MouldFinding:
     drawn, reached = cavity.drawn, cavity.reached
     # The difference, both ways.
     differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
@@ -51,7 +52,7 @@ def _of_cavity(cavity: Cavity, facets: float) -> Iterator[MouldFinding]:
         # Of solids that are alike but for a rounding, the intersection can be larger than either: a second opinion.
         rests = reached - drawn, drawn - reached
         differ = sum(piece.volume() for rest in rests for piece in (thick_pieces(rest) if facets else [rest]))
-    yield at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
+    return at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
 
 
 CHECK = MouldCheck(

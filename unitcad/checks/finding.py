@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
 from typing import TypedDict
 
-from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.mould_set import MouldSet
 
 
@@ -59,14 +58,3 @@ class MouldCheck:
     demands: str
     findings: Callable[[MouldSet], Iterable[MouldFinding]]
     reads_silicone: bool = False
-
-
-def each_cavity(moulds: MouldSet, judge: Callable[[Cavity], Iterable[MouldFinding]]) -> Iterator[MouldFinding]:
-    """Yield the findings of `judge` in every cavity; the place that it names begins with the cavity's."""
-    judged: dict[int, list[MouldFinding]] = {}
-    for cavity in moulds.cavities:
-        first = moulds.cavities[cavity.first]
-        if cavity.first not in judged:
-            judged[cavity.first] = list(judge(first))
-        for finding in judged[cavity.first]:
-            yield replace(finding, where=cavity.where + finding.where.removeprefix(first.where))

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
-from scipy.spatial import KDTree
 
 from unitcad.checks.cup_features import GRID, hollows, wall_limit
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
@@ -19,11 +18,6 @@ from unitcad.kernels.mesh import shells, thick_pieces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.surroundings import Congruence, crop, once_each, reaching
-from unitcad.shape.column import Column
-
-SLACK = 0.1
-"""Margin round a cell, beyond its groove, within which the groove is examined, mm."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
@@ -53,28 +47,11 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     thinnest = farthest = 2 * limit
     if regions:
         groove = CrossSection.batch_boolean(regions, OpType.Add)
-        tiles = _tiles(moulds, groove, farthest, (bottom - farthest, top))
-        deep = [piece for piece in pieces if piece.bounding_box()[2] < top]
-
-        def wall(i: int) -> float:
-            """Return the distance from the groove in a tile to the nearest other hollow, mm, `farthest` at most."""
-            near, there, beside = groove, groove, deep
-            if tiles:
-                there = groove ^ _circle(tiles[i], farthest)
-                near = there ^ _circle(tiles[i], -farthest)
-                beside = [crop(piece, tiles[i]) for piece in reaching(deep, tiles[i])]
-            inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
-            others = Manifold.compose(beside) - inside.translate((0, 0, bottom - GRID))
-            whole = thick_pieces(others)
-            if not whole:
-                return farthest
-            others = Manifold.compose(whole).trim_by_plane((0, 0, -1), -top)
-            return float(Manifold.extrude(near, top - bottom).translate((0, 0, bottom)).min_gap(others, farthest))
-
-        piece = moulds.plan.tool(moulds.plan.walled(step))
-        alike = Congruence([piece.shape], [moulds.solids[piece.name]]) if tiles else None
-        numbers = [alike.number(tile) for tile in tiles] if alike else [0]
-        thinnest = min(value for _, value in once_each(numbers, wall))
+        inside = Manifold.extrude(groove.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
+        deep = Manifold.compose([piece for piece in pieces if piece.bounding_box()[2] < top])
+        if others := thick_pieces(deep - inside.translate((0, 0, bottom - GRID))):
+            hollow = Manifold.compose(others).trim_by_plane((0, 0, -1), -top)
+            thinnest = Manifold.extrude(groove, top - bottom).translate((0, 0, bottom)).min_gap(hollow, farthest)
     advice = "a hole, a window or a notch breaks into the groove, or leaves too thin a wall: move one of the two"
     return at_least("C230", f"{moulds.plan.walled(step)}: wall of the groove", float(thinnest), limit, "mm", advice)
 
@@ -104,36 +81,6 @@ def _beside(sections: list[CrossSection], silicone: list[Manifold], level: float
     cast = CrossSection.batch_boolean([solid.slice(level) for solid in silicone], OpType.Add)
     reach = cast.offset(land + 2 * GRID, JoinType.Round)
     return [section for section in sections if not (section ^ reach).is_empty()]
-
-
-def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[float, float]) -> list[Column]:
-    """Return a column about each of several cells, wider by `beside` than its part of the plate; none for the whole.
-
-    The whole is examined if the cells' parts don't cover the groove.
-    """
-    lay = moulds.plan.layout
-    if len(lay.cells) == 1:
-        return []
-
-    middles = np.array([(cell.x, cell.y) for cell in lay.cells])
-    reach = float(KDTree(middles).query(_border(groove))[0].max()) + SLACK
-    tiles = [Column(cell.x, cell.y, reach + beside, *ends) for cell in lay.cells]
-    covered = CrossSection.batch_boolean([_circle(tile, -beside) for tile in tiles], OpType.Add)
-    return tiles if (groove - covered).is_empty() else []
-
-
-def _border(section: CrossSection) -> np.ndarray:
-    """Return points (n, 2) of a section's border, SLACK apart at most: between two cells a side's ends are nearest."""
-    loops = section.to_polygons()
-    starts = np.concatenate(loops)
-    sides = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops]) - starts
-    parts = np.ceil(np.hypot(*sides.T) / SLACK).astype(int).clip(1)
-    share = (np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)) / np.repeat(parts, parts)
-    return np.repeat(starts, parts, axis=0) + share[:, None] * np.repeat(sides, parts, axis=0)
-
-
-def _circle(column: Column, more: float) -> CrossSection:
-    return CrossSection.circle(column.radius + more, 48).translate((column.x, column.y))
 
 
 CHECK = MouldCheck("C230", "groove: floor and walls of an overflow groove are whole", findings)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, each_cavity
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
 from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.complement import LEAST_AREA, LEAST_WIDTH, regions
 from unitcad.moulds.mould_set import MouldSet
@@ -21,7 +21,7 @@ _SNAPPED = 1 / GRID_PER_MM
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the opening of every cavity, and the narrowest of its vents under a lid."""
-    return each_cavity(moulds, _of_cavity)
+    return (finding for cavity in moulds.cavities for finding in _of_cavity(cavity))
 
 
 def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:

@@ -7,8 +7,7 @@ surface. In a mesh file a pocket of coarse facets for a bought part passes with 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.surroundings import MARGIN, column_round
 from unitcad.shape import Shape, union
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.text import number
@@ -87,7 +85,6 @@ _There = Sequence[tuple[str, Sequence[Manifold]]]
 
 def _of_pours(moulds: MouldSet, volumes: _Volumes) -> Iterator[MouldFinding]:
     for step in moulds.plan.steps:
-        volumes.alike = _alike(moulds, step)
         cells = moulds.meshes(step.layer)
         alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
         yield from _findings(f"pour {step.index}", alone, volumes)
@@ -106,29 +103,6 @@ def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, .
         yield before.name if there == before.layer else f"{before.name} laid in", there
 
 
-def _alike(moulds: MouldSet, step: Step) -> dict[int, Hashable]:
-    """Return for the small solids of a pour, by identity, a value that is the same for those in like surroundings."""
-    around, count = moulds.surroundings[step.index - 1], len(moulds.plan.layout.cells)
-    if count == 1:
-        return {}
-    pours, cast = around.steps[0].index, (*step.earlier, *step.layer)
-    alike: dict[int, Hashable] = {
-        id(solid): (pours, start, cell)
-        for start in range(0, len(cast) - count + 1, count)
-        for solid, cell in zip(moulds.meshes(cast[start : start + count]), moulds.cells[step.index - 1], strict=True)
-    }
-    whole = _reach(moulds.pressed["base"])
-    for name in step.tools:
-        solid = moulds.pressed[name]
-        if _reach(solid) < whole / 2:
-            number = moulds.once(
-                f"surroundings of {name} in pour {pours}",
-                lambda solid=solid: around.congruence.number(column_round([solid], MARGIN)),
-            )
-            alike[id(solid)] = pours, number
-    return alike
-
-
 def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding]:
     """Return the pair that shares most, and every pair that shares too much."""
     pairs = []
@@ -144,29 +118,27 @@ def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
     """Return the volume that two solids share, mm3, without films up to `facets` thick.
 
     If faces coincide the mesh kernel now and then keeps a part that is not shared, but not in each order of the two and
-    not in their difference, so a finding needs all three. `other` is cut first: it takes half as long.
+    not in their difference, so a finding needs all of them. `other` is cut first: it takes half as long.
     """
     shared = other ^ one
     volume = float(shared.volume())
     if volume <= OVERLAP:
         return volume
     if facets:
-        return sum(float(piece.volume()) for piece in thick_pieces(shared, facets))
+        opinions = (thick_pieces(solid, facets) for solid in (shared, one ^ other))
+        return min(sum(float(piece.volume()) for piece in pieces) for pieces in opinions)
     return min(volume, float((one ^ other).volume()), float(one.volume() - (one - other).volume()))
 
 
 class _Volumes:
-    """The volumes that pairs share: a pair that several pours or like places have in common is cut once.
+    """The volumes that pairs share: a pair that several pours have in common is cut once.
 
-    `alike` has, for small solids of a pour by identity, a value that is the same for those in like surroundings;
     `known` and `of_names` have volumes by names; films up to `facets` thick, mm, are left out.
     """
 
     def __init__(self, facets: float, known: Mapping[tuple[str, str], float] | None = None) -> None:
         self.facets = facets
-        self.alike: Mapping[int, Hashable] = {}
         self.of_names = dict(known or {})
-        self._of_places: dict[Hashable, float] = {}
         self._boxes: dict[int, tuple[float, ...]] = {}
         self._kept: list[Manifold] = []
 
@@ -178,21 +150,8 @@ class _Volumes:
         if not len(meeting):
             return None
         if (a, b) not in self.of_names:
-            self.of_names[a, b] = sum(self._cut(parts[i], a, others[k], b) for i, k in meeting)
+            self.of_names[a, b] = sum(common_volume(others[k], parts[i], self.facets) for i, k in meeting)
         return self.of_names[a, b]
-
-    def _cut(self, part: Manifold, a: str, beside: Manifold, b: str) -> float:
-        if id(part) not in self.alike:
-            part, a, beside, b = beside, b, part, a
-        if id(part) not in self.alike:
-            return common_volume(part, beside, self.facets)
-        # Large pieces have unique names; a small one is known by its place relative to the first.
-        own, box = self._box(part), self._box(beside)
-        place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self.alike else b
-        key = self.alike[id(part)], place
-        if key not in self._of_places:
-            self._of_places[key] = common_volume(part, beside, self.facets)
-        return self._of_places[key]
 
     def box(self, parts: Sequence[Manifold]) -> np.ndarray:
         """Return the box round several solids: its low corner, then the high one, mm."""
@@ -210,11 +169,6 @@ def _meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Tell for every two of two sets of boxes (n, 6) and (m, 6) whether they touch."""
     low, high = boxes[:, None, :3], boxes[:, None, 3:]
     return np.all((low <= others[None, :, 3:]) & (others[None, :, :3] <= high), axis=2)
-
-
-def _reach(solid: Manifold) -> float:
-    x0, y0, _, x1, y1, _ = solid.bounding_box()
-    return math.hypot(x1 - x0, y1 - y0) / 2
 
 
 CHECK = MouldCheck("C200", "overlap: no two solids of an assembled step share volume", findings)

@@ -24,7 +24,6 @@ from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
-from unitcad.moulds.surroundings import once_each
 from unitcad.shape import Shape
 from unitcad.spec import Spec
 
@@ -53,10 +52,8 @@ def strains(moulds: MouldSet) -> list[Strain]:
         last = step is moulds.plan.steps[-1]
         if not last and not any(removal.piece == CAST for removal in step.removals):
             continue
-        pulled, parted = peel(moulds, step), _cell_by_cell(moulds, step)
-        numbers = moulds.cells[step.index - 1] if parted else range(len(pulled))
-        judged = once_each(numbers, lambda i, pulled=pulled: peel_strain(*pulled[i]))
-        for i, (_, (strain, z, room)) in enumerate(judged):
+        pulled = peel(moulds, step)
+        for i, (strain, z, room) in enumerate(peel_strain(*each) for each in pulled):
             where = "" if last else f"pour {step.index}: "
             where += "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
             if strain > 0:
@@ -101,7 +98,7 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     """
     lay, base = moulds.plan.layout, moulds.solids[moulds.plan.base_of(step)]
     shapes, cells = (*step.earlier, *step.layer), len(lay.cells)
-    if _cell_by_cell(moulds, step):
+    if len(step.layer) == cells and not _ways(step):
         bodies = [united(moulds.meshes(shapes[i::cells])) for i in range(cells)]
         return [Peel(body, base) for body in bodies]
     whole = united(moulds.meshes(shapes))
@@ -112,11 +109,6 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
     bodies = [whole ^ column.translate((c.x, c.y, 0)) for c in lay.cells]
     return [Peel(body, base) for body in bodies]
-
-
-def _cell_by_cell(moulds: MouldSet, step: Step) -> bool:
-    """Tell whether a pour's layer has a solid in every cell, and none leaves in a way of its own."""
-    return len(step.layer) == len(moulds.plan.layout.cells) and not _ways(step)
 
 
 def _ways(step: Step) -> list[tuple[Shape, Way]]:

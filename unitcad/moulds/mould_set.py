@@ -20,7 +20,6 @@ from unitcad.moulds.cavities import Cavity, cavities, united
 from unitcad.moulds.cup import rib_spaces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.plan import Plan, Step, plan
-from unitcad.moulds.surroundings import Surroundings, surroundings
 from unitcad.shape import Shape
 from unitcad.shape.profile import FACETS
 from unitcad.shape.tree import Body
@@ -239,17 +238,6 @@ class MouldSet:
         return {body.name: self.mesh(body) for body in (*self.unit, *self.plan.tools)}
 
     @cached_property
-    def surroundings(self) -> tuple[Surroundings, ...]:
-        """Surroundings of each place, by the pours in their order; the same object for pours that move nothing."""
-
-        return surroundings(self.plan, self.solids, rib_spaces(self.spec, self.plan.layout), self.segments)
-
-    @cached_property
-    def cells(self) -> tuple[tuple[int, ...], ...]:
-        """For every cell of each pour a number that is the same for cells in like surroundings."""
-        return tuple(each.cells for each in self.surroundings)
-
-    @cached_property
     def rib_spaces(self) -> Manifold:
         """The boxes round the ribs that centre the cups; empty without ribs."""
 
@@ -272,7 +260,7 @@ class MouldSet:
     def cavities(self) -> tuple[Cavity, ...]:
         """The cavities of all pours in their order, one a cell."""
 
-        return cavities(self.plan, self.solids, self.segments, self.cells)
+        return cavities(self.plan, self.solids, self.segments)
 
     def once(self, name: str, make: Callable[[], _T]) -> _T:
         """Return the result of `make`, computed once for this set under `name`."""

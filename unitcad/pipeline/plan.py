@@ -33,7 +33,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.scenes import GAP, pictures
 from unitcad.shape import Shape, content_hash, moved
-from unitcad.shape.column import extent
+from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body, copies, part_names
 from unitcad.spec import Spec
 from unitcad.spec.custom_code import is_body_file, is_custom
