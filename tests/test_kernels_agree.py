@@ -88,7 +88,7 @@ def test_kernels_agree_on_bodies(name):
         assert_mesh_within_bound(shape, mesh.segment_count(20, tolerance), reference)
 
 
-QUICK = {"three-layer", "single-embedded"}
+QUICK = {"single-embedded"}
 """`python -m benchmarks.accuracy kernels --quick` compares the shipped templates in the same way."""
 
 
