@@ -14,15 +14,15 @@ from unitcad.cache import DiskStore
 
 PLANTED = "open({mark!r}, 'w').close()\nraise SystemExit('planted')\n"
 SCRIPT = shutil.which("unitcad", path=str(Path(sys.executable).parent)) or "unitcad"
-SWEEP = 'base = "single-embedded"\n[set]\n"output.formats" = ["stl"]\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
+SWEEP = 'base = "single-embedded"\n[set]\n"output.formats" = ["stl", "png"]\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
 COMMANDS = [
-    "build single-embedded --formats stl,png --only unit",
     "batch sweep.toml --only unit -j 1",
     "check a.stl b.stl -j 2",
     "check a.step b.stl",
     "report result",
 ]
 MORE = [
+    "build single-embedded --formats stl,png --only unit",
     "build single-embedded --formats step,stl,3mf,svg,png,glb",
     "batch sweep.toml -j 0",
     "batch sweep.toml --only estimate",
@@ -91,7 +91,7 @@ def test_nothing_is_imported_from_the_working_directory(arguments, material, tmp
     _run([SCRIPT, *arguments.split()], here, ran)
 
 
-@pytest.mark.parametrize("arguments", ["check a.stl b.stl -j 2", pytest.param(COMMANDS[0], marks=pytest.mark.long)])
+@pytest.mark.parametrize("arguments", ["check a.stl b.stl -j 2", pytest.param(MORE[0], marks=pytest.mark.long)])
 def test_python_m_imports_no_more_than_python_itself(arguments, material, tmp_path):
     (tmp_path / "trivial.py").write_text("import sys\nprint(*sys.modules)\n")
     command = [sys.executable, "-m", "trivial"]
