@@ -7,17 +7,21 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
+from pathlib import Path
 
 MESSAGE = {"Content-Type": "application/json"}
+TOKEN = "a-token-of-the-lab"
+"""What UNITCAD_TOKEN says where a test has to know the token."""
 
 
 class Server:
-    """A running `unitcad serve`: its address, its token, its process."""
+    """A running `unitcad serve`: its address, its token, its process, the folder in which it runs."""
 
-    def __init__(self, url, process):
-        self.url, self.process = url, process
+    def __init__(self, url, process, folder):
+        self.url, self.process, self.folder = url, process, Path(folder)
         self.base, _, self.token = url.partition("/?token=")
         self.port = int(self.base.rpartition(":")[2])
 
@@ -50,6 +54,16 @@ class Server:
         assert status == 200, content
         return json.loads(content)
 
+    def ended(self, state, seconds=60.0):
+        """Wait for the end of a job; return its last state and the stages that it named."""
+        stages, end = [state["stage"]], time.monotonic() + seconds
+        while not state["ended"]:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+            state = json.loads(self.send(f"/job/{state['job']}")[1])
+            stages += [state["stage"]] if state["stage"] != stages[-1] else []
+        return state, stages
+
     def raw(self, content, seconds=20.0):
         """Send bytes over a socket and return what comes back until the server closes or `seconds` have passed."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=seconds) as line:
@@ -71,7 +85,7 @@ def serving(folder, *arguments, environment=None):
     with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True, env=given) as process:
         try:
             assert process.stdout
-            yield Server(process.stdout.readline().strip(), process)
+            yield Server(process.stdout.readline().strip(), process, folder)
         finally:
             process.send_signal(signal.SIGINT)
             try:

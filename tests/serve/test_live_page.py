@@ -270,6 +270,9 @@ def test_save_and_build_from_the_page(running, tmp_path):
         result.wait_for_selector("html[data-ready=yes]", timeout=60_000)
         # It runs apart from the server: no token, no cookie, no question.
         assert result.evaluate("() => window.origin") == "null"
+        with result.expect_download() as under_way:
+            result.locator("#files").get_by_role("link", name="base.stl", exact=True).first.click()
+        assert under_way.value.path().stat().st_size > 1000
         visit.close()
     manifests = list((tmp_path / "out").glob("*/manifest.json"))
     assert len(manifests) == 1
