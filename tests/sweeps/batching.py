@@ -101,6 +101,19 @@ def unitcad(*words, cwd=None, env=None):
     )
 
 
+def summary_of(*words, env=None):
+    """Run a batch as a command, which succeeds; return its summary."""
+    done = unitcad("batch", *words, "--json", env=env)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def started(*words, **more):
+    """Start a command in a process of its own."""
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command(*words), stdout=pipe, stderr=pipe, text=True, env=environment(), **more)
+
+
 def command(*words):
     """Return a command line; a batch of rings makes their units alone, which takes the kernel no time."""
     rings = (
