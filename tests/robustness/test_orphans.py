@@ -8,7 +8,6 @@ import sys
 import pytest
 from process_trees import below, left
 
-ENDS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
