@@ -66,7 +66,6 @@ def test_what_a_killed_process_left_goes_and_what_a_live_one_has_stays(tmp_path)
         "    os._exit(9)\n"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
-        assert child.stdout is not None
         assert child.stdout.readline()
         clear_leftovers(tmp_path)
         assert len(list(tmp_path.iterdir())) == 1
@@ -178,7 +177,7 @@ def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments, reason, tmp_
     started = f"import sys; sys.argv[1:] = {arguments.split()!r}; from unitcad.cli import main; main()"
     limited = f"import resource; resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30)); {started}"
     command = [sys.executable, "-P", "-c", limited]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1

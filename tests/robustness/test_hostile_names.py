@@ -103,11 +103,8 @@ def folders(tmp_path_factory):
 
 
 def _built(names, out):
-    store = MemoryStore()
-    return {
-        name: build(_spec(name), out, only=["unit", "casting", "estimate"], check=False, store=store).folder
-        for name in names
-    }
+    asked = {"only": ["unit", "casting", "estimate"], "check": False, "store": MemoryStore()}
+    return {name: build(_spec(name), out, **asked).folder for name in names}
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -78,7 +78,7 @@ def _planted(material, folder, spared=frozenset()):
 def _run(command, here, ran):
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONSAFEPATH")}
     environment["UNITCAD_CACHE"] = str(here.parent / "cache")
-    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, timeout=300)
     assert [path.name for path in ran.iterdir()] == []
     assert "planted" not in done.stderr + done.stdout
     assert "Traceback" not in done.stderr

@@ -3,6 +3,7 @@
 import pytest
 
 pytest.importorskip("starlette", reason="the extra serve is not installed")
+pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from running import TOKEN, serving
 

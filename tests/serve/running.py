@@ -1,5 +1,6 @@
 """A server that runs as a command, and a client that speaks to it as its page does."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -10,7 +11,10 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+import uvicorn
 
 MESSAGE = {"Content-Type": "application/json"}
 TOKEN = "a-token-of-the-lab"
@@ -77,6 +81,35 @@ class Server:
             return got
 
 
+def apart(coroutine):
+    """Run a coroutine in a thread of its own, since a browser's test leaves a loop in the main one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, coroutine).result()
+
+
+def against(app, http, client, **settings):
+    """Run a client, given what connects it, against an app whose connections are of the class `http`."""
+
+    async def both():
+        listening = socket.create_server(("127.0.0.1", 0), backlog=200)
+        address = listening.getsockname()
+        config = uvicorn.Config(app, http=http, ws="none", lifespan="off", log_level="critical", **settings)
+        server = uvicorn.Server(config)
+        running = asyncio.create_task(server.serve(sockets=[listening]))
+        while not server.started:
+            await asyncio.sleep(0.01)
+        with contextlib.ExitStack() as lines:
+            try:
+                await asyncio.to_thread(
+                    client, lambda: lines.enter_context(socket.create_connection(address, timeout=20.0))
+                )
+            finally:
+                server.should_exit = True
+                await running
+
+    apart(both())
+
+
 @contextlib.contextmanager
 def serving(folder, *arguments, environment=None):
     """Run `unitcad serve` in a folder, without a browser unless asked for, with variables added to the environment."""
@@ -84,7 +117,6 @@ def serving(folder, *arguments, environment=None):
     pipe, given = subprocess.PIPE, {**os.environ, **(environment or {})}
     with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True, env=given) as process:
         try:
-            assert process.stdout
             yield Server(process.stdout.readline().strip(), process, folder)
         finally:
             process.send_signal(signal.SIGINT)
@@ -93,6 +125,5 @@ def serving(folder, *arguments, environment=None):
             except subprocess.TimeoutExpired:
                 process.kill()
                 raise
-            assert process.stderr
             told = process.stderr.read()
             assert (told, process.returncode) == ("", 0), told

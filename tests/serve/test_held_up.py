@@ -3,7 +3,6 @@
 import asyncio
 import json
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -12,10 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from running import TOKEN, serving
-
-pytest.importorskip("uvicorn", reason="the extra serve is not installed")
-import uvicorn
+from running import TOKEN, against, serving
 
 from unitcad.files import TEMPORARY, scratch
 from unitcad.serve.access_keys import AccessKeys
@@ -32,25 +28,9 @@ class Quick(Connection):
 
 
 def behind_a_guard(app, client):
-    """Run a client, given a function that connects it, of an app behind a guard that lets one request in."""
-
-    async def both():
-        listening = socket.create_server(("127.0.0.1", 0))
-        guard = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
-        config = uvicorn.Config(
-            guard, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
-        )
-        server = uvicorn.Server(config)
-        running = asyncio.create_task(server.serve(sockets=[listening]))
-        try:
-            await asyncio.to_thread(client, lambda: socket.create_connection(listening.getsockname(), timeout=20.0))
-        finally:
-            server.should_exit = True
-            await running
-
-    # In a thread of its own: a browser's test before this one leaves a loop in the main one.
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(asyncio.run, both()).result()
+    """Run a client against an app behind a guard that lets one request in."""
+    guard = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
+    against(guard, Quick, client, timeout_graceful_shutdown=1)
 
 
 def answered(connect):
@@ -135,7 +115,7 @@ def test_a_start_removes_the_leftovers_of_a_killed_server_and_none_of_a_live_one
             "; kept = scratch(pathlib.Path(sys.argv[1]))"
             "; kept.__enter__(); os.kill(os.getpid(), signal.SIGKILL)"
         )
-        subprocess.run([sys.executable, "-P", "-c", killed, str(out)], check=False)
+        subprocess.run([sys.executable, "-P", "-c", killed, str(out)])
         assert len(list(out.glob(f"{TEMPORARY}*"))) == 2
         with serving(tmp_path, "embedded"):
             assert list(out.glob(f"{TEMPORARY}*")) == [live]

@@ -1,7 +1,5 @@
 """Requests of others: another site's, a rebound name's, without the token, too large, too slow, out of the folder."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import time

@@ -96,9 +96,7 @@ def unitcad(*words, cwd=None, env=None):
     line = command(*words)
     if not env and "--scheduler" not in words:
         return in_process.unitcad(*line[3:], cwd=cwd)
-    return subprocess.run(
-        line, capture_output=True, text=True, check=False, timeout=300, env=env or environment(), cwd=cwd
-    )
+    return subprocess.run(line, capture_output=True, text=True, timeout=300, env=env or environment(), cwd=cwd)
 
 
 def summary_of(*words, env=None):

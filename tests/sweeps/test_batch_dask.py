@@ -45,7 +45,6 @@ class Cluster:
         )
 
     def _read(self, child, pattern):
-        assert child.stderr is not None
         for line in child.stderr:
             if match := re.search(pattern, line):
                 return match[1]
@@ -153,7 +152,7 @@ def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster):
         "asyncio.run(cell())\n"
     )
     command = [sys.executable, "-c", cell]
-    done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=60)
     assert done.stdout == "2\n", done.stderr
 
 
@@ -230,7 +229,7 @@ def test_a_batch_on_four_nodes_outlives_worker_scheduler_and_parent(tmp_path):
         pytest.importorskip(library)
     words = [sys.executable, str(BENCH), "--variants", "400", "--geometries", "4", "--only", "unit", "--no-check"]
     done = subprocess.run(
-        [*words, "--json", str(tmp_path / "figures.json")], capture_output=True, text=True, check=False, timeout=1800
+        [*words, "--json", str(tmp_path / "figures.json")], capture_output=True, text=True, timeout=1800
     )
     assert done.returncode == 0, done.stdout + done.stderr
     figures = json.loads((tmp_path / "figures.json").read_text())

@@ -1,7 +1,5 @@
 """Batches killed at random moments: what was done stays as it is, nothing runs on, and the end is the same bytes."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
