@@ -105,7 +105,7 @@ def counts(vertices, faces):
                 ends = [(free + 1) % 3, (free + 2) % 3]
                 if _through(corners[j][ends[0]], corners[j][ends[1]], corners[i]):
                     edge = tuple(sorted(int(faces[j][k]) for k in ends))
-                    sides.setdefault(edge, set()).add(height[free] > 0)  # type: ignore[arg-type]
+                    sides.setdefault(edge, set()).add(height[free] > 0)
         crossing += sum(len(both) == 2 for both in sides.values())
     return crossing, (overlap, overlap + folded), touching
 

@@ -3,8 +3,6 @@
 A case's options are those of `unitcad.check.Options`; "printer" is a name of the catalogue.
 """
 
-from __future__ import annotations
-
 import sys
 import warnings
 import zipfile

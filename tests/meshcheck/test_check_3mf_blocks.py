@@ -123,7 +123,7 @@ def _confirm_equal(text, chunk, block):
         assert at_once == _read(text, chunk)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(_models(), st.sampled_from([7, 60, 10_000]), st.sampled_from([60, 200, 10_000]))
 def test_reading_at_once_changes_nothing(text, chunk, block):
     _confirm_equal(text, chunk, block)
@@ -181,7 +181,6 @@ def test_most_of_a_part_is_read_at_once(line_end):
     pieces, model = _parsed(text)
     assert len(b"".join(pieces).strip()) < 400 + text.count(b"\n")
     (mesh,) = (one.mesh for one in model.objects().values())
-    assert mesh is not None
     assert np.array_equal(mesh.vertices[:, 2], [float(f"1e-{i % 9}") for i in range(5000)])
     assert np.array_equal(mesh.rows[:, 0], np.arange(4998))
     of_last = text[: text.rindex(b"<triangle")].count(b"\n") + 1

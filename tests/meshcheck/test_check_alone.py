@@ -44,7 +44,7 @@ def test_check_needs_only_the_modules_below_it(tmp_path):
     (tmp_path / "whole.3mf").write_bytes(package())
     (tmp_path / "thin.obj").write_text(obj(CUBE_CORNERS * [10, 10, 0.2], CUBE_FACES))
     command = [sys.executable, "-c", CODE, "open.stl", "whole.3mf", "thin.obj"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     codes, libraries = json.loads(done.stdout)
     assert codes == [["T001"], [], ["D001"]]

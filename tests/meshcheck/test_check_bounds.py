@@ -102,7 +102,7 @@ def test_a_file_larger_than_the_memory_allows_is_refused_by_its_size(name, tmp_p
         file.truncate(260_000_000)
     done = subprocess.run(
         [sys.executable, "-m", "unitcad", "check", name, "--memory", "1000"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        cwd=tmp_path, capture_output=True, text=True,
     )  # fmt: skip
     assert done.stdout.splitlines()[0] == (
         f"{name}: F011 error: 260000000 bytes, more than a quarter of the 1000 MB of memory (--memory)"

@@ -17,7 +17,7 @@ from unitcad.meshcheck import Options, check_file, check_mesh
 from unitcad.meshcheck.file_checks import check_files, check_guarded
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(max_size=300), suffix=st.sampled_from([".stl", ".3mf", ".obj", ".ply", ".off", ".step"]))
 def test_any_bytes_are_an_error_or_a_mesh(data, suffix, tmp_path):
     path = tmp_path / f"a{suffix}"
@@ -26,7 +26,7 @@ def test_any_bytes_are_an_error_or_a_mesh(data, suffix, tmp_path):
     assert report.verdict == "error" or report.facts.triangles
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.tuples(*[st.integers(-2, 2)] * 3), min_size=3, max_size=8),
     st.lists(st.tuples(*[st.integers(0, 7)] * 3), min_size=1, max_size=12),
@@ -92,7 +92,7 @@ def test_a_worker_that_dies_names_its_file(tmp_path, monkeypatch):
     for name in ("a.stl", "b.stl", "c.stl"):
         (tmp_path / name).write_bytes(stl(box()))
     work = [(str(tmp_path / name), dying.Deadly(name == "b.stl")) for name in ("a.stl", "b.stl", "c.stl")]
-    reports = list(check_files(work, 2))  # type: ignore[arg-type]
+    reports = list(check_files(work, 2))
     assert [report.has("F011") for report in reports] == [False, True, False]
 
 

@@ -25,7 +25,6 @@ def test_facts_are_those_of_the_meshes_placed_one_by_one(judge):
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     assert facts.area_mm2 == pytest.approx(areas.sum() / 2, rel=1e-12)
     assert facts.volume_mm3 == pytest.approx(sum(abs(np.linalg.det(m[:3])) for m in matrices) * 254**3, rel=1e-12)
-    assert facts.bbox_mm is not None
     assert np.allclose(facts.bbox_mm, [np.min(placed, axis=(0, 1)), np.max(placed, axis=(0, 1))], rtol=1e-12)
     assert facts.triangles == 480
 

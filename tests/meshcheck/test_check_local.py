@@ -129,7 +129,7 @@ PARTS = {
 }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     one=st.sampled_from(sorted(PARTS)),
     other=st.sampled_from(sorted(PARTS)),
@@ -144,7 +144,7 @@ def test_two_parts_far_apart_have_the_findings_of_each(one, other, scale, seed):
     assert codes(check_mesh(*weld_exact(np.concatenate([first, second])))) == alone
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     part=st.sampled_from(["sound", "hole", "seam", "gap", "inside out", "turned over", "hollow", "nested", "pierced"]),
     seed=st.integers(0, 999),

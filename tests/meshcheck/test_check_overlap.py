@@ -130,7 +130,7 @@ def test_solids_that_share_an_edge_do_not_overlap(body, apart):
         assert codes(check_mesh(points, faces)) <= {"G003", "T003"}
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10**6),
     values=st.sampled_from([(0, 1), (0, 1, 2), (-1, 0, 1), (0, 1, 2, 3)]),
@@ -159,7 +159,7 @@ def test_every_winding_number_but_0_and_1_is_an_error(seed, values, turn):
     assert bool(errors) == (not {0, 1} >= set(field.ravel().tolist())), (errors, field)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(n=st.integers(4, 12), seed=st.integers(0, 10**6), turn=st.booleans(), scale=st.sampled_from([0.3, 1.0, 40.0]))
 def test_faces_of_one_concave_polygon_are_not_accused(n, seed, turn, scale):
     """Top and bottom of a prism are one concave polygon each, cut into triangles that do not overlap."""

@@ -143,9 +143,7 @@ def test_the_3mf_opens_elsewhere(tmp_path):
     if slicer is None:
         pytest.skip("needs PrusaSlicer for its own word")
     environment = {**os.environ, "LC_ALL": "C.UTF-8"}
-    done = subprocess.run(
-        [slicer, "--info", str(made)], capture_output=True, text=True, timeout=120, env=environment, check=False
-    )
+    done = subprocess.run([slicer, "--info", str(made)], capture_output=True, text=True, timeout=120, env=environment)
     assert done.returncode == 0, done.stderr
     assert re.findall(r"number_of_facets = +(\d+)", done.stdout)[-1] == "10"
 

@@ -58,7 +58,6 @@ def test_solids_volume_and_box(tmp_path):
     assert [found.code for found in report.findings] == ["G002"]  # a quarter of the cylinder lies in the box
     assert report.facts.shells == 2
     assert report.facts.volume_mm3 == pytest.approx(6000 + 785.3981633974483, rel=1e-9)
-    assert report.facts.bbox_mm is not None
     assert report.facts.bbox_mm[1] == pytest.approx((10, 20, 30), abs=1e-6)
     assert check_file(path, Options(shells=1)).has("G005")
     cut = tmp_path / "cut.step"

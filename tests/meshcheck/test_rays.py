@@ -45,7 +45,7 @@ def by_brute_force(mesh, points, owners, reach, side):
     return thickness, behind
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 @given(
     drawn=st.sampled_from([slotted, fan]),
     gap=st.floats(0.05, 0.7),

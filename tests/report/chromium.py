@@ -1,8 +1,12 @@
 """Debian's Chromium, driven by Playwright."""
 
 import contextlib
+import io
 import shutil
 from pathlib import Path
+
+import numpy as np
+from PIL import Image
 
 FLAGS = (
     "--no-sandbox",
@@ -114,6 +118,17 @@ class Visit:
         )
         return self.page.screenshot(full_page=True, clip=clip)
 
+    def pixels(self, selector):
+        """Return the pixels of where a part stands, (height, width, 3) from 0 to 255."""
+        return np.asarray(Image.open(io.BytesIO(self.picture(selector))).convert("RGB")).astype(int)
+
+    def colour(self, name):
+        """Return a colour of the theme, (3,) from 0 to 255."""
+        said = self.page.evaluate("(name) => window.unitcad.theme.colour(name)", name)
+        return np.array([int(said[i : i + 2], 16) for i in (1, 3, 5)])
+
     def close(self):
-        """End the visit."""
+        """End the visit; nothing was thrown, nor said on the console."""
         self.context.close()
+        assert self.errors == []
+        assert self.console == []

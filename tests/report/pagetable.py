@@ -1,6 +1,19 @@
-"""A batch's table: as a page shows it, and pages with a table of a test's own."""
+"""A page's data, a batch's table as a page shows it, and pages with a table of a test's own."""
+
+import base64
+import gzip
+import json
+import re
 
 from unitcad.report import page as pages
+
+
+def data_of(html):
+    """A page's data, as the page reads it; those of a live page are not compressed."""
+    packed = re.search(r'<script type="text/plain" id="data">([A-Za-z0-9+/=]*)</script>', html)
+    assert packed
+    content = base64.b64decode(packed[1])
+    return json.loads(gzip.decompress(content) if content.startswith(b"\x1f\x8b") else content)
 
 
 def column(visit, name):

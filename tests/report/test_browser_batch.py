@@ -1,21 +1,15 @@
 """A batch's page in Chromium: sorting, filtering, paging, the plot, opening a variant; markup stays text."""
 
-import io
-
 import numpy as np
 import pytest
 from chromium import Visit
 from pagetable import column, table_page
-
-Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
 
 
 @pytest.fixture
 def visit(running, sweep):
     seen = Visit(running, sweep / "report.html")
     yield seen
-    assert seen.errors == []
-    assert seen.console == []
     assert {url.partition("#")[0] for url in seen.requests} == {(sweep / "report.html").resolve().as_uri()}
     seen.close()
 
@@ -53,30 +47,12 @@ def test_sorting(visit):
     assert first == sorted(first)
 
 
-@pytest.mark.parametrize(
-    ("field", "text", "count"),
-    [
-        ("name", "e 1.5", 2),
-        ("layers.0.wall_mm", "> 1.25", 4),
-        ("layers.0.wall_mm", ">=1.25", 7),
-        ("layers.0.wall_mm", "1.1..1.3", 3),
-        ("layers.0.wall_mm", "= 1", 3),
-        ("layers.0.wall_mm", "<1", 0),
-        ("layers.0.material", "DRAGON", 4),
-        ("design", "= embedded", 7),
-    ],
-)
-def test_filtering(visit, field, text, count):
-    visit.page.fill(f'input[name="filter-{field}"]', text)
-    assert len(column(visit, "name")) == count
-    assert visit.page.inner_text(".count") == f"{count} of 10 variants"
-
-
 def test_filters_join(visit):
     visit.page.fill('input[name="filter-layers.0.wall_mm"]', "<= 1.25")
     visit.page.fill('input[name="filter-layers.0.material"]', "ecoflex")
     visit.page.fill('input[name="search"]', "embedded")
     assert column(visit, "name") == ["e 1.0 ecoflex-00-10", "e 1.25 ecoflex-00-10"]
+    assert visit.page.inner_text(".count") == "2 of 10 variants"
 
 
 def test_the_plot_shows_what_the_table_shows_and_opens_a_variant(visit):
@@ -87,10 +63,7 @@ def test_the_plot_shows_what_the_table_shows_and_opens_a_variant(visit):
     assert "1 of 1 points" in visit.page.inner_text("#plot .tip")
     over = visit.page.locator("#plot .u-over")
     over.scroll_into_view_if_needed()
-    image = np.asarray(Image.open(io.BytesIO(visit.picture("#plot .u-over"))).convert("RGB")).astype(int)
-    accent = visit.page.evaluate("() => window.unitcad.theme.colour('series-1')")
-    rgb = np.array([int(accent[i : i + 2], 16) for i in (1, 3, 5)])
-    spots = np.argwhere(np.abs(image - rgb).max(axis=2) < 70)
+    spots = np.argwhere(np.abs(visit.pixels("#plot .u-over") - visit.colour("series-1")).max(axis=2) < 70)
     y, x = spots.mean(axis=0)
     over.hover(position={"x": float(x), "y": float(y)})
     assert "e 1.5 ecoflex-00-10" in visit.page.inner_text("#plot .tip")
@@ -138,7 +111,6 @@ def test_two_thousand_rows_come_in_pages(running, tmp_path):
     assert "667 of 2000" in seen.page.inner_text(".count")
     assert "page 1 of 7" in seen.page.inner_text(".variants")
     assert "2000 failed" in seen.page.inner_text("header")
-    assert seen.errors == []
     seen.close()
 
 
@@ -151,5 +123,4 @@ def test_a_row_without_a_folder_says_how_to_make_it(running, tmp_path, folder, w
     visit.page.click(".variants tbody a")
     visit.page.wait_for_function("() => document.querySelector('.lacking').textContent")
     assert f"unitcad export 0123456789ab --batch {word} && unitcad report {word}" in note.inner_text()
-    assert visit.errors == []
     visit.close()

@@ -1,7 +1,5 @@
 """The page without a browser: what it holds, what it costs, what it refuses."""
 
-import base64
-import gzip
 import json
 import re
 import shutil
@@ -9,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from pagetable import data_of
 from typer.testing import CliRunner
 
 from unitcad.cache import MemoryStore
@@ -22,13 +21,6 @@ from unitcad.validation import load, templates
 
 NAMESPACE = "http://www.w3.org/1999/xhtml"
 """Of HTML's elements: a name in three.js, which no browser opens."""
-
-
-def data_of(html):
-    """A page's data, as the page reads it."""
-    packed = re.search(r'<script type="text/plain" id="data">([A-Za-z0-9+/=]*)</script>', html)
-    assert packed
-    return json.loads(gzip.decompress(base64.b64decode(packed[1])))
 
 
 def resolved(node, pool):

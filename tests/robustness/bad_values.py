@@ -5,6 +5,7 @@ import datetime
 import json
 import random
 import re
+from collections import Counter
 
 import msgspec
 
@@ -56,9 +57,14 @@ def toml(data):
 
 
 def sample(count, seed):
-    """`count` of a spec's, drawn from a seed; all if there are fewer."""
-    found = bad_values()
-    return found if len(found) <= count else random.Random(seed).sample(found, count)
+    """`count` of a spec's, drawn from a seed; no path has another one before every path has one."""
+    found, met = bad_values(), Counter()
+    random.Random(seed).shuffle(found)
+    turns = []
+    for path, _ in found:
+        turns.append(met[path])
+        met[path] += 1
+    return [case for _, case in sorted(zip(turns, found, strict=True), key=lambda pair: pair[0])][:count]
 
 
 def _bad(node, schema, path):

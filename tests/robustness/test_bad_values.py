@@ -41,7 +41,7 @@ def _check_advice(refusal, path, value, base):
         assert other.field != refusal.field, (str(refusal), str(other))
 
 
-@pytest.mark.parametrize("count", [1000, pytest.param(None, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [400, pytest.param(None, marks=pytest.mark.long)])
 def test_bad_values_are_refused_with_their_field(count):
     found = sample(count, SEED) if count else bad_values()
     assert count or len(found) > 10_000
@@ -139,7 +139,7 @@ def check_words_are_refused(words, field, tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-FILES = ["name = 1979-05-27", f"diameter_mm = {'9' * 5000}", f"{'.'.join('a' * 5000)} = 1", "a = " + "[" * 5000]
+FILES = ["name = 1979-05-27", f"diameter_mm = {'9' * 5000}", f"{'.'.join('a' * 1500)} = 1", "a = " + "[" * 5000]
 """Texts that no spec can be."""
 
 

@@ -1,11 +1,11 @@
 """Code that lies in a result, or that a spec brings along, never runs unasked."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
+
+from tests.in_process import unitcad
+from unitcad.spec.custom_code import allow_nothing
 
 SPEC = """
 name = "planted"
@@ -19,17 +19,14 @@ formats = []
 tolerance_mm = 0.1
 """
 CODE = """
-open({ran!r}, "w").close()
+def mark():
+    open({ran!r}, "w").close()
+mark()
 from unitcad.shape import ring
 def f(spec):
+    mark()  # this process keeps what it has run
     return ring(4.5, 7.0, 0, 2.0)
 """
-
-
-def _unitcad(*arguments, cwd):
-    command = [sys.executable, "-m", "unitcad", *map(str, arguments)]
-    environment = {**os.environ, "UNITCAD_CACHE": str(cwd / "cache")}
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False, timeout=120)
 
 
 class Planted:
@@ -50,18 +47,23 @@ class Planted:
         # Without the text: a path, to where the command runs or anywhere else.
         (folder / "results/two/spec.toml").write_text(SPEC.format(design=f"{folder}/d.py:f"))
 
+    def run(self, arguments):
+        """Run a command in the folder, as in a process that has been told of no code yet."""
+        allow_nothing()
+        return unitcad(*arguments.split(), cwd=self.folder)
+
 
 @pytest.fixture
-def planted(tmp_path):
-    return Planted(tmp_path)
+def planted(tmp_path, monkeypatch):
+    monkeypatch.setenv("UNITCAD_CACHE", str(tmp_path / "cache"))
+    yield Planted(tmp_path)
+    allow_nothing()
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
         "report results",
-        "report results/one",
-        "report results/two",
         "build embedded.toml --only unit",
         "build results/one/spec.toml --only unit",
         "estimate embedded.toml",
@@ -71,7 +73,7 @@ def planted(tmp_path):
     ],
 )
 def test_code_that_nobody_named_does_not_run(arguments, planted):
-    done = _unitcad(*arguments.split(), cwd=planted.folder)
+    done = planted.run(arguments)
     assert not planted.ran.exists()
     assert "Traceback" not in done.stderr
     assert "internal error" not in done.stderr
@@ -82,31 +84,28 @@ def test_code_that_nobody_named_does_not_run(arguments, planted):
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        "build named.toml --only unit",
-        "build embedded.toml --only unit --allow-code",
-    ],
+    ["build named.toml --only unit", "build embedded.toml --only unit --allow-code"],
 )
 def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(arguments, planted):
-    done = _unitcad(*arguments.split(), cwd=planted.folder)
+    done = planted.run(arguments)
     assert done.returncode == 0, done.stderr
     assert planted.ran.exists()
 
 
 def test_an_estimate_reads_a_named_design_and_with_it_runs_its_file(planted):
     """Its file says whether it has an estimate; a function has none."""
-    done = _unitcad("estimate", "named.toml", cwd=planted.folder)
+    done = planted.run("estimate named.toml")
     assert planted.ran.exists()
     assert done.returncode == 2, done.stderr
     assert "has no estimate" in done.stderr
 
 
 def test_a_page_is_made_of_a_result_whose_code_does_not_run(planted):
-    assert _unitcad("build", "named.toml", "--only", "unit", "-o", "results", cwd=planted.folder).returncode == 0
+    assert planted.run("build named.toml --only unit -o results").returncode == 0
     planted.ran.unlink()
-    done = _unitcad("report", "results", cwd=planted.folder)
+    done = planted.run("report results")
     assert done.returncode == 0, done.stderr
     assert (planted.folder / "results" / "report.html").is_file()
     assert not planted.ran.exists()
-    assert _unitcad("report", "results", "--allow-code", cwd=planted.folder).returncode == 0
+    assert planted.run("report results --allow-code").returncode == 0
     assert planted.ran.exists()

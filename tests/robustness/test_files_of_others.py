@@ -66,7 +66,6 @@ def test_what_a_killed_process_left_goes_and_what_a_live_one_has_stays(tmp_path)
         "    os._exit(9)\n"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
-        assert child.stdout is not None
         assert child.stdout.readline()
         clear_leftovers(tmp_path)
         assert len(list(tmp_path.iterdir())) == 1
@@ -163,21 +162,26 @@ def test_json_that_is_none_is_one_clear_error(text, tmp_path):
         files.read_json(tmp_path / "a.json")
 
 
-@pytest.mark.parametrize("arguments", ["build {}", "estimate {}", "check --manifest {}"])
-@pytest.mark.parametrize("kind", ["pipe.toml", "/dev/zero", "large.toml"])
-def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments, kind, tmp_path):
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ("build pipe.toml", "not a regular file"),
+        ("estimate large.toml", "larger than 16 MB"),
+        ("check --manifest /dev/zero", "not a regular file"),
+    ],
+)
+def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments, reason, tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")
     with open(tmp_path / "large.toml", "wb") as file:
         file.truncate(10_000_000_000)
-    name = kind if kind.startswith("/") else str(tmp_path / kind)
-    started = f"import sys; sys.argv[1:] = {arguments.format(name).split()!r}; from unitcad.cli import main; main()"
+    started = f"import sys; sys.argv[1:] = {arguments.split()!r}; from unitcad.cli import main; main()"
     limited = f"import resource; resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30)); {started}"
     command = [sys.executable, "-P", "-c", limited]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
-    assert ("larger than 16 MB" if "large" in kind else "not a regular file") in done.stderr
+    assert reason in done.stderr
 
 
 def test_scratch_of_a_process_that_ended_before_its_mark_is_removed(tmp_path):

@@ -111,4 +111,4 @@ def test_damage_is_never_silent(name, seeds):
         assert facts.triangles is not None or report.verdict == "error", (name, seed)
         if report.verdict != "error":
             assert facts.watertight, (name, seed)
-            assert (facts.triangles or 0) >= TRIANGLES, (name, seed)
+            assert facts.triangles >= TRIANGLES, (name, seed)

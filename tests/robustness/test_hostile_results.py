@@ -1,7 +1,5 @@
 """Pages of damaged or hostile results: nothing outside is read, nothing runs, nothing hangs, the rest is shown."""
 
-import base64
-import gzip
 import json
 import os
 import re
@@ -11,6 +9,7 @@ import chromium
 import hostile_results
 import pytest
 from hostile_results import KINDS, SECRET
+from pagetable import data_of
 
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build
@@ -49,9 +48,7 @@ def _spoilt(good, folder, kinds):
 
 
 def _data(page):
-    packed = re.search(r'<script type="text/plain" id="data">([A-Za-z0-9+/=]*)</script>', page.read_text("utf-8"))
-    assert packed
-    return json.loads(gzip.decompress(base64.b64decode(packed[1])))
+    return data_of(page.read_text("utf-8"))
 
 
 def test_one_damaged_result_does_not_keep_the_others_from_the_page(good, tmp_path):

@@ -5,7 +5,7 @@ import sys
 
 from unitcad.text import some
 
-MANY = 3000
+MANY = 300
 
 
 def check_error_is_short(words, files, folder):

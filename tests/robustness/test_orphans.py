@@ -8,7 +8,6 @@ import sys
 import pytest
 from process_trees import below, left
 
-ENDS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
@@ -26,8 +25,10 @@ def check(folder):
     return ["check", "--jobs", 2, *(folder / name for name in ("a.obj", "b.obj", "c.obj"))], 2
 
 
-@pytest.mark.parametrize("end", ENDS, ids=lambda end: end.name)
-@pytest.mark.parametrize("started", [build, check], ids=lambda started: started.__name__)
+@pytest.mark.parametrize(
+    ("started", "end"),
+    [(build, signal.SIGKILL), (build, signal.SIGTERM), (check, signal.SIGKILL), (check, signal.SIGINT)],
+)
 def test_a_command_leaves_no_process(started, end, tmp_path):
     check_nothing_is_left(*started(tmp_path), end)
 

@@ -14,15 +14,15 @@ from unitcad.cache import DiskStore
 
 PLANTED = "open({mark!r}, 'w').close()\nraise SystemExit('planted')\n"
 SCRIPT = shutil.which("unitcad", path=str(Path(sys.executable).parent)) or "unitcad"
-SWEEP = 'base = "single-embedded"\n[set]\n"output.formats" = ["stl"]\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
+SWEEP = 'base = "single-embedded"\n[set]\n"output.formats" = ["stl", "png"]\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
 COMMANDS = [
-    "build single-embedded --formats stl,png --only unit",
     "batch sweep.toml --only unit -j 1",
     "check a.stl b.stl -j 2",
     "check a.step b.stl",
     "report result",
 ]
 MORE = [
+    "build single-embedded --formats stl,png --only unit",
     "build single-embedded --formats step,stl,3mf,svg,png,glb",
     "batch sweep.toml -j 0",
     "batch sweep.toml --only estimate",
@@ -78,7 +78,7 @@ def _planted(material, folder, spared=frozenset()):
 def _run(command, here, ran):
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONSAFEPATH")}
     environment["UNITCAD_CACHE"] = str(here.parent / "cache")
-    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, timeout=300)
     assert [path.name for path in ran.iterdir()] == []
     assert "planted" not in done.stderr + done.stdout
     assert "Traceback" not in done.stderr
@@ -91,7 +91,7 @@ def test_nothing_is_imported_from_the_working_directory(arguments, material, tmp
     _run([SCRIPT, *arguments.split()], here, ran)
 
 
-@pytest.mark.parametrize("arguments", ["check a.stl b.stl -j 2", pytest.param(COMMANDS[0], marks=pytest.mark.long)])
+@pytest.mark.parametrize("arguments", ["check a.stl b.stl -j 2", pytest.param(MORE[0], marks=pytest.mark.long)])
 def test_python_m_imports_no_more_than_python_itself(arguments, material, tmp_path):
     (tmp_path / "trivial.py").write_text("import sys\nprint(*sys.modules)\n")
     command = [sys.executable, "-m", "trivial"]

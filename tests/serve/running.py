@@ -1,5 +1,6 @@
 """A server that runs as a command, and a client that speaks to it as its page does."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -7,17 +8,24 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import uvicorn
 
 MESSAGE = {"Content-Type": "application/json"}
+TOKEN = "a-token-of-the-lab"
+"""What UNITCAD_TOKEN says where a test has to know the token."""
 
 
 class Server:
-    """A running `unitcad serve`: its address, its token, its process."""
+    """A running `unitcad serve`: its address, its token, its process, the folder in which it runs."""
 
-    def __init__(self, url, process):
-        self.url, self.process = url, process
+    def __init__(self, url, process, folder):
+        self.url, self.process, self.folder = url, process, Path(folder)
         self.base, _, self.token = url.partition("/?token=")
         self.port = int(self.base.rpartition(":")[2])
 
@@ -50,6 +58,16 @@ class Server:
         assert status == 200, content
         return json.loads(content)
 
+    def ended(self, state, seconds=60.0):
+        """Wait for the end of a job; return its last state and the stages that it named."""
+        stages, end = [state["stage"]], time.monotonic() + seconds
+        while not state["ended"]:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+            state = json.loads(self.send(f"/job/{state['job']}")[1])
+            stages += [state["stage"]] if state["stage"] != stages[-1] else []
+        return state, stages
+
     def raw(self, content, seconds=20.0):
         """Send bytes over a socket and return what comes back until the server closes or `seconds` have passed."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=seconds) as line:
@@ -63,6 +81,35 @@ class Server:
             return got
 
 
+def apart(coroutine):
+    """Run a coroutine in a thread of its own, since a browser's test leaves a loop in the main one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, coroutine).result()
+
+
+def against(app, http, client, **settings):
+    """Run a client, given what connects it, against an app whose connections are of the class `http`."""
+
+    async def both():
+        listening = socket.create_server(("127.0.0.1", 0), backlog=200)
+        address = listening.getsockname()
+        config = uvicorn.Config(app, http=http, ws="none", lifespan="off", log_level="critical", **settings)
+        server = uvicorn.Server(config)
+        running = asyncio.create_task(server.serve(sockets=[listening]))
+        while not server.started:
+            await asyncio.sleep(0.01)
+        with contextlib.ExitStack() as lines:
+            try:
+                await asyncio.to_thread(
+                    client, lambda: lines.enter_context(socket.create_connection(address, timeout=20.0))
+                )
+            finally:
+                server.should_exit = True
+                await running
+
+    apart(both())
+
+
 @contextlib.contextmanager
 def serving(folder, *arguments, environment=None):
     """Run `unitcad serve` in a folder, without a browser unless asked for, with variables added to the environment."""
@@ -70,8 +117,7 @@ def serving(folder, *arguments, environment=None):
     pipe, given = subprocess.PIPE, {**os.environ, **(environment or {})}
     with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True, env=given) as process:
         try:
-            assert process.stdout
-            yield Server(process.stdout.readline().strip(), process)
+            yield Server(process.stdout.readline().strip(), process, folder)
         finally:
             process.send_signal(signal.SIGINT)
             try:
@@ -79,6 +125,5 @@ def serving(folder, *arguments, environment=None):
             except subprocess.TimeoutExpired:
                 process.kill()
                 raise
-            assert process.stderr
             told = process.stderr.read()
             assert (told, process.returncode) == ("", 0), told

@@ -69,22 +69,15 @@ def test_the_form_has_every_key_of_the_schema_with_its_range(server, text):
     assert all(set(field) <= set(Field.__struct_fields__) for field in fields.values())
 
 
-def ended(own, state):
-    """Wait for a job's end; returns its last state and the stages that it named."""
-    stages = [state["stage"]]
-    while not state["ended"]:
-        time.sleep(0.02)
-        state = json.loads(own.send(f"/job/{state['job']}")[1])
-        stages += [state["stage"]] if state["stage"] != stages[-1] else []
-    return state, stages
+SMALL = templates()["single-embedded"].read_text("utf-8")
 
 
-def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path, text):
-    with serving(tmp_path, "encapsulating", "-o", "made") as own:
-        quick = text + '\n[output]\nformats = ["stl"]\n'
+def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path):
+    with serving(tmp_path, "single-embedded", "-o", "made") as own:
+        quick = SMALL + '\n[output]\nformats = ["stl"]\n'
         state = json.loads(own.send("/build", {"text": quick})[1])
         assert own.send("/build", {"text": quick})[0] == 422  # one at a time
-        state, stages = ended(own, state)
+        state, stages = own.ended(state)
         assert state["code"] == 0
         assert (tmp_path / state["folder"] / "manifest.json").is_file()
         timed = json.loads((tmp_path / state["folder"] / "timings.json").read_text())["seconds"]
@@ -99,17 +92,17 @@ def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path, text):
         state = json.loads(own.send("/cancel", {"job": state["job"]})[1])
         assert state["ended"]
         assert state["code"] != 0
-        assert len(list((tmp_path / "made").glob("encapsulating-*"))) == 1
+        assert len(list((tmp_path / "made").glob("single-embedded-*"))) == 1
 
 
-def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path, text):
+def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path):
     (tmp_path / "out" / "sweep-1").mkdir(parents=True)
     with serving(tmp_path) as own:
-        quick = text + "\n[output]\nformats = []\n"
-        # At 1.8 the circuit's pad has to be smaller than the default for 1.25.
-        message = {"text": quick, "key": "layers.0.wall_mm", "low": 1.0, "high": 1.8, "count": 2}
+        quick = SMALL + "\n[output]\nformats = []\n"
+        # At 3.0 the circuit's pad has to be smaller than the default for 2.5.
+        message = {"text": quick, "key": "layers.0.wall_mm", "low": 2.0, "high": 3.0, "count": 2}
         state = json.loads(own.send("/sweep", message)[1])
-        state, stages = ended(own, state)
+        state, stages = own.ended(state)
         assert state["code"] == 0, state
         assert stages[0] == "0 of 2 variants"
         assert "1 of 2 variants" in stages or "2 of 2 variants" in stages
@@ -119,6 +112,6 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path, text):
     folder = tmp_path / "out" / "sweep-2"
     assert sorted(path.name for path in folder.iterdir()) == ["results", "spec.toml", "sweep.toml"]
     swept = from_file(tomllib.loads((folder / "sweep.toml").read_text()), folder, "sweep")
-    assert [(axis.path, axis.values) for axis in swept.axes] == [("layers.0.wall_mm", [1.0, 1.8])]
+    assert [(axis.path, axis.values) for axis in swept.axes] == [("layers.0.wall_mm", [2.0, 3.0])]
     # Defaults follow the key's values: the base is the text itself.
     assert (folder / "spec.toml").read_text() == quick

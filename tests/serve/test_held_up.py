@@ -3,7 +3,6 @@
 import asyncio
 import json
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -12,17 +11,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from running import serving
-
-pytest.importorskip("uvicorn", reason="the extra serve is not installed")
-import uvicorn
+from running import TOKEN, against, serving
 
 from unitcad.files import TEMPORARY, scratch
 from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.request_guard import Limits, RequestGuard
 from unitcad.serve.server import Connection
 
-TOKEN = "a-token-of-the-lab"
 HEAD = f"GET / HTTP/1.1\r\nHost: x:1\r\nX-Unitcad-Token: {TOKEN}\r\n\r\n".encode()
 
 
@@ -33,25 +28,9 @@ class Quick(Connection):
 
 
 def behind_a_guard(app, client):
-    """Run a client, given a function that connects it, of an app behind a guard that lets one request in."""
-
-    async def both():
-        listening = socket.create_server(("127.0.0.1", 0))
-        guard = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
-        config = uvicorn.Config(
-            guard, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
-        )
-        server = uvicorn.Server(config)
-        running = asyncio.create_task(server.serve(sockets=[listening]))
-        try:
-            await asyncio.to_thread(client, lambda: socket.create_connection(listening.getsockname(), timeout=20.0))
-        finally:
-            server.should_exit = True
-            await running
-
-    # In a thread of its own: a browser's test before this one leaves a loop in the main one.
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(asyncio.run, both()).result()
+    """Run a client against an app behind a guard that lets one request in."""
+    guard = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
+    against(guard, Quick, client, timeout_graceful_shutdown=1)
 
 
 def answered(connect):
@@ -115,32 +94,15 @@ def test_an_address_is_bounded_without_a_token(server):
         assert b" 414 " in server.raw(head.encode())
 
 
-def ended(own, state):
-    """The state of a job after its end."""
-    end = time.monotonic() + 60
-    while not state["ended"]:
-        assert time.monotonic() < end
-        time.sleep(0.05)
-        state = json.loads(own.send(f"/job/{state['job']}")[1])
-    return state
-
-
-def test_of_two_jobs_at_once_one_runs_and_a_refused_sweep_leaves_nothing(tmp_path, text):
+def test_of_two_jobs_at_once_one_runs_and_a_refused_sweep_leaves_nothing(server, text):
     sweep = {"text": text, "key": "no_such_key", "low": 1.0, "high": 2.0, "count": 2}
-    with serving(tmp_path, "embedded") as own, ThreadPoolExecutor(4) as apart:
-        answers = list(apart.map(lambda _: own.send("/sweep", sweep), range(4)))
-        assert sorted(status for status, *_ in answers) == [200, 422, 422, 422]
-        state = next(json.loads(content) for status, content, _ in answers if status == 200)
-        state = ended(own, state)
-        assert state["code"] == 2, state
-        assert not (tmp_path / "out").exists()
-
-
-def test_of_saves_at_once_under_a_new_name_one_is_made(tmp_path):
-    with serving(tmp_path, "embedded") as own, ThreadPoolExecutor(8) as apart:
-        saves = [{"text": f"a = {i}", "name": "mine.toml"} for i in range(8)]
-        every = [status for status, *_ in apart.map(lambda save: own.send("/save", save), saves)]
-    assert sorted(every) == [200, *[422] * 7]
+    before = sorted(server.folder.rglob("*"))
+    with ThreadPoolExecutor(4) as apart:
+        answers = list(apart.map(lambda _: server.send("/sweep", sweep), range(4)))
+    assert sorted(status for status, *_ in answers) == [200, 422, 422, 422]
+    state, _ = server.ended(next(json.loads(content) for status, content, _ in answers if status == 200))
+    assert state["code"] == 2, state
+    assert sorted(server.folder.rglob("*")) == before
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="Windows")
@@ -153,20 +115,19 @@ def test_a_start_removes_the_leftovers_of_a_killed_server_and_none_of_a_live_one
             "; kept = scratch(pathlib.Path(sys.argv[1]))"
             "; kept.__enter__(); os.kill(os.getpid(), signal.SIGKILL)"
         )
-        subprocess.run([sys.executable, "-P", "-c", killed, str(out)], check=False)
+        subprocess.run([sys.executable, "-P", "-c", killed, str(out)])
         assert len(list(out.glob(f"{TEMPORARY}*"))) == 2
         with serving(tmp_path, "embedded"):
             assert list(out.glob(f"{TEMPORARY}*")) == [live]
 
 
-def test_the_token_is_of_the_environment_and_not_passed_on(tmp_path, text):
-    with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": TOKEN}) as own:
-        assert own.token == TOKEN
-        own.ask(text)  # its workers have started
-        proc = Path(f"/proc/{own.process.pid}")
-        if proc.exists():
-            assert TOKEN.encode() not in (proc / "cmdline").read_bytes()
-            tasks = (proc / "task").iterdir()
-            children = {pid for task in tasks for pid in (task / "children").read_text().split()}
-            assert children
-            assert not any(TOKEN.encode() in Path(f"/proc/{pid}/environ").read_bytes() for pid in children)
+def test_the_token_is_of_the_environment_and_not_passed_on(server, text):
+    assert server.token == TOKEN
+    server.ask(text)  # its workers have started
+    proc = Path(f"/proc/{server.process.pid}")
+    if proc.exists():
+        assert TOKEN.encode() not in (proc / "cmdline").read_bytes()
+        tasks = (proc / "task").iterdir()
+        children = {pid for task in tasks for pid in (task / "children").read_text().split()}
+        assert children
+        assert not any(TOKEN.encode() in Path(f"/proc/{pid}/environ").read_bytes() for pid in children)

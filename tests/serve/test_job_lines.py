@@ -3,10 +3,10 @@
 import asyncio
 import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import pytest
+from running import apart
 
 from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import Jobs, build_folder
@@ -29,16 +29,12 @@ def test_a_line_of_70_000_characters_ends_neither_its_job_nor_the_next_one(tmp_p
             for _ in range(2):
                 state = jobs.start("the build", [], {}, build_folder(tmp_path / "out"))
                 watching = jobs.known[state.job].watching
-                assert watching
                 await asyncio.wait_for(watching, 60)
                 states.append(state)
             return states
         finally:
             await jobs.close()
 
-    # In a thread of its own: a browser's test before this one leaves a loop in the main one.
-    with ThreadPoolExecutor(1) as apart:
-        states = apart.submit(asyncio.run, run()).result()
-    for state in states:
+    for state in apart(run()):
         assert (state.ended, state.code, state.lines) == (True, 0, ["x" * 4000, "y"])
     assert not (tmp_path / "out").exists()

@@ -19,8 +19,7 @@ def test_a_server_that_is_killed_in_mid_sweep_leaves_no_process(tmp_path):
     words = [sys.executable, "-m", "unitcad", "serve", "--no-browser", "encapsulating"]
     process = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        assert process.stdout
-        server = Server(process.stdout.readline().strip(), process)
+        server = Server(process.stdout.readline().strip(), process, tmp_path)
         text = templates()["encapsulating"].read_text("utf-8")
         swept = {"text": text, "key": "diameter_mm", "low": 14.0, "high": 20.0, "count": 24}
         status, content, _ = server.send("/sweep", swept)

@@ -141,7 +141,7 @@ def test_a_patch_is_shown_and_changed(running, pockets):
     live = Live(running, pockets)
     assert "mould checks passed" in live.state
     assert live.page.inner_text("h1") == "forearm-pockets"
-    assert "sheet" in (live.page.get_attribute(".stage-host", "data-shown") or "")
+    assert "sheet" in live.page.get_attribute(".stage-host", "data-shown")
     assert live.page.locator("#estimate img").count() == 2
     # The line above the view has the crosstalk and the pours; the view has the tools too.
     glance = live.page.inner_text("#glance")
@@ -151,7 +151,7 @@ def test_a_patch_is_shown_and_changed(running, pockets):
     assert radios.all_inner_texts() == ["Patch", "Moulds"]
     assert "along x" in live.page.inner_text('.stage select[name="axis"]')
     live.page.check('.stage input[value="moulds"]')
-    shown = (live.page.get_attribute(".stage-host", "data-shown") or "").split()
+    shown = live.page.get_attribute(".stage-host", "data-shown").split()
     assert {tool.name for tool in patch_moulds(load_array("forearm-pockets")).plan.tools} < set(shown)
     live.page.check('.stage input[value="unit"]')
     before = live.page.locator("#estimate img").first.get_attribute("src")

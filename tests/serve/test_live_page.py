@@ -98,7 +98,7 @@ def test_every_control_changes_the_spec(live):
     ):  # fmt: skip
         field = live.page.locator(f'.field[data-path="{path}"]')
         before = live.page.input_value("#text")
-        kind = (field.get_attribute("class") or "").split()[1]
+        kind = field.get_attribute("class").split()[1]
         main = field.locator("input, select").first
         if kind == "of-switch":
             main.click()
@@ -270,6 +270,9 @@ def test_save_and_build_from_the_page(running, tmp_path):
         result.wait_for_selector("html[data-ready=yes]", timeout=60_000)
         # It runs apart from the server: no token, no cookie, no question.
         assert result.evaluate("() => window.origin") == "null"
+        with result.expect_download() as under_way:
+            result.locator("#files").get_by_role("link", name="base.stl", exact=True).first.click()
+        assert under_way.value.path().stat().st_size > 1000
         visit.close()
     manifests = list((tmp_path / "out").glob("*/manifest.json"))
     assert len(manifests) == 1

@@ -5,10 +5,10 @@ import contextlib
 import os
 import signal
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import msgspec
 import pytest
+from running import apart
 
 from unitcad.errors import UnitcadError
 from unitcad.serve import questions
@@ -41,9 +41,7 @@ def with_questions(act):
         finally:
             await asked.close()
 
-    # In a thread of its own: the browser of other tests has a loop in this one.
-    with ThreadPoolExecutor(1) as apart:
-        apart.submit(asyncio.run, run()).result()
+    apart(run())
 
 
 @pytest.fixture(autouse=True)
@@ -90,7 +88,7 @@ def test_a_burst_of_edits_keeps_the_worker():
             every.append(asking(asked, "0.1"))
             await asyncio.sleep(0.02)
         done = await asyncio.gather(*every, return_exceptions=True)
-        assert int(done[-1]) == first  # type: ignore[arg-type]
+        assert int(done[-1]) == first
         assert any(isinstance(one, Superseded) for one in done)
         assert last_pid(asked) == first
 

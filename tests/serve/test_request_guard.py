@@ -1,15 +1,14 @@
 """Requests of others: another site's, a rebound name's, without the token, too large, too slow, out of the folder."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from running import serving
+from running import TOKEN
 
 from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.request_guard import BODY_S, LARGEST_BODY
@@ -107,38 +106,37 @@ OPENED = {
 }
 
 
-def test_a_folder_s_key_opens_its_files_alone(tmp_path, text):
+def test_a_folder_s_key_opens_its_files_alone(server, text):
     """What a result's own page has, which runs as another site."""
     for file in ("one/report.html", "one/deep/base.stl", "other/spec.toml", "at-root.json"):
-        (tmp_path / "out" / file).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / "out" / file).write_text("{}")
-    with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
-        address = AccessKeys("a-token-of-the-lab").address("one/report.html")
-        key = address.partition("/")[0]
-        for file in ("one/report.html", "one/deep/base.stl"):
-            status, _, headers = own.send(f"/files/{key}/{file}", headers=OPENED)
-            assert status == 200
-            assert headers["content-security-policy"].startswith("sandbox ")
-            assert "Access-Control-Allow-Origin" not in headers
-        for path in (
-            f"{key}/other/spec.toml", f"{key}/at-root.json", f"{key}/spec.toml", "one/report.html", key, f"{key}/",
-            f"/{key}/one/report.html", f"{key[:-1]}/one/report.html", f"{key.upper()}/one/report.html",
-            "%c3%a9/one/report.html",
-        ):  # fmt: skip
-            assert own.send(f"/files/{path}", headers=OPENED)[0] == 403, path
-        assert own.send(f"/files/{key}/one/../other/spec.toml", headers=OPENED)[0] == 404
-        assert own.send("/files/one/report.html")[0] == 404  # the token alone is no key
-        for path, message in (("/", None), ("/ask", {"text": text}), (f"/job/{key}", None), (f"/{key}/", None)):
-            assert own.send(path, message, headers={**OPENED, "Sec-Fetch-Site": "none"})[0] == 403
-        # What a script, a picture or a frame of such a page asks for, and another site's form.
-        for headers in (
-            {"Origin": "null"}, {"Origin": "http://evil.example"}, {"Sec-Fetch-Mode": "cors"},
-            {"Sec-Fetch-Mode": "no-cors"}, {"Sec-Fetch-Dest": "iframe"}, {"Sec-Fetch-Dest": "image"},
-            {"Sec-Fetch-Dest": "script"}, {"Sec-Fetch-Dest": ""},
-        ):  # fmt: skip
-            assert own.send(f"/files/{address}", headers={**OPENED, **headers})[0] == 403, headers
-        assert own.send(f"/files/{address}", headers={**OPENED, "Host": "evil.example"})[0] == 421
-        assert own.send(f"/files/{address}", {"text": text}, headers=OPENED)[0] == 403
+        (server.folder / "out" / file).parent.mkdir(parents=True, exist_ok=True)
+        (server.folder / "out" / file).write_text("{}")
+    address = AccessKeys(TOKEN).address("one/report.html")
+    key = address.partition("/")[0]
+    for file in ("one/report.html", "one/deep/base.stl"):
+        status, _, headers = server.send(f"/files/{key}/{file}", headers=OPENED)
+        assert status == 200
+        assert headers["content-security-policy"].startswith("sandbox ")
+        assert "Access-Control-Allow-Origin" not in headers
+    for path in (
+        f"{key}/other/spec.toml", f"{key}/at-root.json", f"{key}/spec.toml", "one/report.html", key, f"{key}/",
+        f"/{key}/one/report.html", f"{key[:-1]}/one/report.html", f"{key.upper()}/one/report.html",
+        "%c3%a9/one/report.html",
+    ):  # fmt: skip
+        assert server.send(f"/files/{path}", headers=OPENED)[0] == 403, path
+    assert server.send(f"/files/{key}/one/../other/spec.toml", headers=OPENED)[0] == 404
+    assert server.send("/files/one/report.html")[0] == 404  # the token alone is no key
+    for path, message in (("/", None), ("/ask", {"text": text}), (f"/job/{key}", None), (f"/{key}/", None)):
+        assert server.send(path, message, headers={**OPENED, "Sec-Fetch-Site": "none"})[0] == 403
+    # What a script, a picture or a frame of such a page asks for, and another site's form.
+    for headers in (
+        {"Origin": "null"}, {"Origin": "http://evil.example"}, {"Sec-Fetch-Mode": "cors"},
+        {"Sec-Fetch-Mode": "no-cors"}, {"Sec-Fetch-Dest": "iframe"}, {"Sec-Fetch-Dest": "image"},
+        {"Sec-Fetch-Dest": "script"}, {"Sec-Fetch-Dest": ""},
+    ):  # fmt: skip
+        assert server.send(f"/files/{address}", headers={**OPENED, **headers})[0] == 403, headers
+    assert server.send(f"/files/{address}", headers={**OPENED, "Host": "evil.example"})[0] == 421
+    assert server.send(f"/files/{address}", {"text": text}, headers=OPENED)[0] == 403
 
 
 def test_a_request_has_one_host(server):
@@ -148,20 +146,19 @@ def test_a_request_has_one_host(server):
     assert b" 421 " in server.raw(none.encode())
 
 
-def test_no_path_leads_out_of_a_result(tmp_path, text):
-    one = tmp_path / "out" / "one"
-    (one / ".hidden").mkdir(parents=True)
-    for file in (one / "fine.json", one / ".hidden" / "x.json", tmp_path / "secret.toml"):
+def test_no_path_leads_out_of_a_result(server):
+    result = server.folder / "out" / "result"
+    (result / ".hidden").mkdir(parents=True)
+    for file in (result / "fine.json", result / ".hidden" / "x.json", server.folder / "secret.toml"):
         file.write_text("{}")
-    (one / "link.html").symlink_to(tmp_path / "secret.toml")
-    (one / "linked").symlink_to(tmp_path)
-    with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
-        key = AccessKeys("a-token-of-the-lab").address("one/fine.json").partition("/")[0]
-        assert own.send(f"/files/{key}/one/fine.json")[0] == 200
-        for path in [*PATHS, *(f"{key}/{path}" for path in PATHS), *(f"{key}/one/{path}" for path in PATHS)]:
-            line = f"GET /files/{path} HTTP/1.1\r\nHost: 127.0.0.1:{own.port}\r\nX-Unitcad-Token: {own.token}\r\n\r\n"
-            answer = own.raw(line.encode("latin-1"))
-            assert answer.split(b" ")[1] in (b"404", b"400"), (path, answer[:200])
+    (result / "link.html").symlink_to(server.folder / "secret.toml")
+    (result / "linked").symlink_to(server.folder)
+    key = AccessKeys(TOKEN).address("result/fine.json").partition("/")[0]
+    assert server.send(f"/files/{key}/result/fine.json")[0] == 200
+    for path in [*PATHS, *(f"{key}/{path}" for path in PATHS), *(f"{key}/result/{path}" for path in PATHS)]:
+        line = f"GET /files/{path} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n\r\n"
+        answer = server.raw(line.encode("latin-1"))
+        assert answer.split(b" ")[1] in (b"404", b"400"), (path, answer[:200])
 
 
 def test_a_huge_body_is_refused_before_it_is_read(server):
@@ -222,17 +219,20 @@ def test_files_that_a_text_names_are_not_read(server, text, tmp_path):
         assert "hunter2" not in json.dumps(answer)
 
 
-def test_specs_are_saved_in_the_folder_alone(tmp_path, text):
-    with serving(tmp_path, "embedded") as own:
-        assert own.send("/save", {"text": text, "name": "mine.toml"})[0] == 200
-        assert (tmp_path / "mine.toml").read_text() == text
-        status, content, _ = own.send("/save", {"text": text + "# more\n", "name": "mine.toml"})
-        assert status == 422
-        assert "exists already" in content.decode()
-        assert (tmp_path / "mine.toml").read_text() == text
-        assert own.send("/save", {"text": text + "# more\n", "name": "mine.toml", "replace": True})[0] == 200
-        assert (tmp_path / "mine.toml").read_text().endswith("# more\n")
-        assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.toml"]
+def test_specs_are_saved_in_the_folder_alone(server, text):
+    """Of saves at once under a new name one is made."""
+    before, file = set(server.folder.iterdir()), server.folder / "mine.toml"
+    saves = [{"text": f"{text}# {i}\n", "name": file.name} for i in range(8)]
+    with ThreadPoolExecutor(8) as apart:
+        answers = list(apart.map(lambda save: server.send("/save", save), saves))
+    assert sorted(status for status, *_ in answers) == [200, *[422] * 7]
+    made = next(i for i, (status, *_) in enumerate(answers) if status == 200)
+    status, content, _ = server.send("/save", {"text": text, "name": file.name})
+    assert (status, b"exists already" in content) == (422, True)
+    assert file.read_text() == saves[made]["text"]
+    assert server.send("/save", {"text": text, "name": file.name, "replace": True})[0] == 200
+    assert file.read_text() == text
+    assert set(server.folder.iterdir()) == before | {file}
 
 
 def test_the_page_can_be_framed_by_nobody_and_contacts_its_own_server_alone(server):

@@ -34,7 +34,6 @@ def page(built):
     return page
 
 
-@pytest.mark.smoke
 def test_files_are_downloaded_by_a_click(page, tmp_path):
     for name in DOWNLOADED:
         with page.expect_download() as under_way:

@@ -44,9 +44,9 @@ def test_shipped_code_runs_with_a_word_alone(server):
     assert server.ask(lugs)["faults"]
 
 
-def test_a_port_that_is_taken_is_told(tmp_path):
-    with serving(tmp_path) as own, pytest.raises(UnitcadError, match=f"127.0.0.1:{own.port}"):
-        serve(None, port=own.port)
+def test_a_port_that_is_taken_is_told(server):
+    with pytest.raises(UnitcadError, match=f"127.0.0.1:{server.port}"):
+        serve(None, port=server.port)
 
 
 def test_a_spec_that_is_not_there_is_refused():

@@ -96,9 +96,20 @@ def unitcad(*words, cwd=None, env=None):
     line = command(*words)
     if not env and "--scheduler" not in words:
         return in_process.unitcad(*line[3:], cwd=cwd)
-    return subprocess.run(
-        line, capture_output=True, text=True, check=False, timeout=300, env=env or environment(), cwd=cwd
-    )
+    return subprocess.run(line, capture_output=True, text=True, timeout=300, env=env or environment(), cwd=cwd)
+
+
+def summary_of(*words, env=None):
+    """Run a batch as a command, which succeeds; return its summary."""
+    done = unitcad("batch", *words, "--json", env=env)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def started(*words, **more):
+    """Start a command in a process of its own."""
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command(*words), stdout=pipe, stderr=pipe, text=True, env=environment(), **more)
 
 
 def command(*words):

@@ -23,8 +23,6 @@ def s3_server():
         [sys.executable, "-W", "ignore", "-c", _SERVE],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
     )  # fmt: skip
-    assert child.stdout
-    assert child.stdin
     port = next(line.strip() for line in child.stdout if line.strip().isdigit())  # it says more than the port
     environment = {
         "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",

@@ -20,8 +20,8 @@ def test_its_result_is_short_and_holds_no_script(tmp_path):
     ("call", "words"),
     [
         (lambda: batch("publishd"), "^sweep = 'publishd': unknown name"),
-        (lambda: batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
-        (lambda: batch("published", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
+        (lambda: batch(None), "^sweep: takes a path, not NoneType$"),
+        (lambda: batch("published", jobs="2"), "^jobs = '2': must be a whole number"),
         (lambda: batch("published", limit=0), "^limit = 0: must be a whole number from 1 "),
         (lambda: batch("published", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
     ],

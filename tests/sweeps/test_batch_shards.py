@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from batching import bytes_of, calls, environment, ring_sweep, rows, unitcad
+from batching import bytes_of, calls, environment, ring_sweep, rows, summary_of, unitcad
 
 from unitcad.cache import DiskStore, shared_store
 from unitcad.errors import UnitcadError, WrongArgument
@@ -26,9 +26,33 @@ def made(sweep, out, **options):
     return make(load_sweep(sweep), out, BatchOptions(("unit",), **options), Workers(jobs=0))
 
 
-def export_variant(batch, wanted, out, cache):
-    (folder,) = export_variants(batch, [wanted], out, cache)
+def export_variant(batch, wanted, out, cache="fresh"):
+    (folder,) = export_variants(batch, [wanted], out, DiskStore(out.parent / cache))
     return folder
+
+
+def merged(out, shards=None, **options):
+    record_packs.store_at.cache_clear()
+    return merge(out, shard_folders(out) if shards is None else shards, BatchOptions(**options))
+
+
+def both_shards(four):
+    sweep, out = four
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    return sweep, out
+
+
+def lose(paths):
+    for path in paths:
+        if path.is_file():
+            path.unlink()
+    record_packs.store_at.cache_clear()
+
+
+def results_of(out, head="ring-"):
+    """The bytes of the variants' folders, or of one's."""
+    return {path: sha for path, sha in bytes_of(out).items() if path.startswith(head)}
 
 
 @pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 1000])
@@ -62,14 +86,14 @@ def test_shards_merged_are_the_batch_without_shards(tmp_path):
     assert [path.name for path in out.iterdir() if path.name != "store"] != []
     assert not list(out.glob("ring-*"))
 
-    summary = merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh"))
+    summary = merged(out, cache=tmp_path / "fresh")
     assert (summary.ok, summary.failed) == (10, 0)
     made(sweep, tmp_path / "plain", cache=tmp_path / "other")
-    merged = {p: sha for p, sha in bytes_of(out).items() if not p.startswith(("store/", "shard-"))}
-    assert merged == bytes_of(tmp_path / "plain")
+    joined = {p: sha for p, sha in bytes_of(out).items() if not p.startswith(("store/", "shard-"))}
+    assert joined == bytes_of(tmp_path / "plain")
 
     folder = rows(out)[7]["folder"]
-    assert export_variant(out, folder[-12:], tmp_path / "one", DiskStore(tmp_path / "fresh")).name == folder
+    assert export_variant(out, folder[-12:], tmp_path / "one").name == folder
 
     # The merged folder is a batch: the same command without --shard has nothing left to do.
     again = made(sweep, out, store=str(out / "store"))
@@ -80,52 +104,46 @@ def test_shards_merged_are_the_batch_without_shards(tmp_path):
 def test_two_shards_at_once(tmp_path):
     """Processes of their own, on one store: what is made twice was in flight in both, so at most once in each."""
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=2), tmp_path / "out"
-    words = ("batch", sweep, "-o", out, "-j", 0, "--json", "--shard")
+    words = (sweep, "-o", out, "-j", 0, "--shard")
     with ThreadPoolExecutor(2) as pool:
-        done = list(pool.map(lambda n: unitcad(*words, f"{n}/2", env=environment()), (1, 2)))
-    assert [each.returncode for each in done] == [0, 0], done
-    assert sum(json.loads(each.stdout)["ok"] for each in done) == 6
+        done = list(pool.map(lambda n: summary_of(*words, f"{n}/2", env=environment()), (1, 2)))
+    assert sum(each["ok"] for each in done) == 6
     assert max(Counter(calls(tmp_path / "s")).values()) <= 2
-    merged = unitcad("batch", "merge", out, "--json")
-    assert merged.returncode == 0, merged.stderr
-    assert json.loads(merged.stdout)["ok"] == 6
+    assert summary_of("merge", out)["ok"] == 6
     assert len(list(out.glob("ring-*"))) == 6
 
 
-def test_shards_that_do_not_fit_together(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
-    with pytest.raises(UnitcadError, match="is required: folders of shards"):
-        merge(out, [], BatchOptions())
+def test_shards_that_do_not_fit_together(four, tmp_path):
+    sweep, out = four
+
+    def refused(folders, why):
+        with pytest.raises(UnitcadError, match=why):
+            merged(out, folders)
+
+    refused([], "is required: folders of shards")
     made(sweep, out, shard=Shard(1, 2))
-    with pytest.raises(UnitcadError, match="1 of 2 shards is missing: 2/2; run it with"):
-        merge(out, shard_folders(out), BatchOptions())
-    with pytest.raises(UnitcadError, match=r"is not a shard of a batch \(no shard.json\)"):
-        merge(out, [out], BatchOptions())
-    with pytest.raises(UnitcadError, match="nowhere: no such folder"):
-        merge(out, [tmp_path / "nowhere"], BatchOptions())
+    refused(None, "1 of 2 shards is missing: 2/2; run it with")
+    refused([out], r"is not a shard of a batch \(no shard.json\)")
+    refused([tmp_path / "nowhere"], "nowhere: no such folder")
     with pytest.raises(UnitcadError, match="has shards, which unitcad batch merge joins"):
         made(sweep, out)
     first = out / "shard-1-of-2"
-    with pytest.raises(UnitcadError, match="is shard 1/2, as is"):
-        merge(out, [first, first], BatchOptions())
-    other = ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2)
+    refused([first, first], "is shard 1/2, as is")
+    other = ring_sweep(tmp_path / "t", heights=[2.0, 5.0], materials=2)
     made(other, tmp_path / "others", shard=Shard(2, 2))
-    with pytest.raises(UnitcadError, match="is a shard of another batch than"):
-        merge(out, [first, tmp_path / "others" / "shard-2-of-2"], BatchOptions())
-    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2)
+    refused([first, tmp_path / "others" / "shard-2-of-2"], "is a shard of another batch than")
     made(sweep, out, shard=Shard(2, 2))
     journal = out / "shard-2-of-2" / "journal.jsonl"
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
-    with pytest.raises(UnitcadError, match="1 of 2 variants are not made yet, the first is variant 3"):
-        merge(out, shard_folders(out), BatchOptions())
+    refused(None, "1 of 2 variants are not made yet, the first is variant 3")
     assert not (out / "batch.json").exists()
     assert not (out / "journal.jsonl").exists()
     with pytest.raises(UnitcadError, match="shard-2-of-2 is of another batch"):  # another shard in a shard's folder
-        made(ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2), out, shard=Shard(1, 2))
+        made(other, out, shard=Shard(1, 2))
 
 
-def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+def test_a_shard_is_refused_where_no_merge_could_take_it(four, tmp_path):
+    sweep, out = four
     made(sweep, out, shard=Shard(1, 2))
     with pytest.raises(UnitcadError, match=r"has shards of 2 \(shard-1-of-2\).* go on with --shard K/2"):
         made(sweep, out, shard=Shard(3, 3))
@@ -135,28 +153,28 @@ def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path):
         made(sweep, tmp_path / "other", shard=Shard(1, 2))
     assert not shard_folders(tmp_path / "other")
     made(sweep, out, shard=Shard(2, 2))
-    merge(out, shard_folders(out), BatchOptions(folders=False))
+    merged(out, folders=False)
     assert made(sweep, out, shard=Shard(2, 2)).resumed == 2  # beside the batch that was merged of it
 
 
-def test_shards_have_one_store(tmp_path):
+def test_shards_have_one_store(four, tmp_path):
     """Of two stores a merge made a batch that no variant could be exported from."""
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    sweep, out = four
     made(sweep, out, shard=Shard(1, 2), store=str(tmp_path / "a"))
     assert made(sweep, out, shard=Shard(1, 2)).resumed == 2
     with pytest.raises(UnitcadError, match=r"shard-1-of-2 has its results in the store .*/a, so this shard"):
         made(sweep, out, shard=Shard(2, 2), store=str(tmp_path / "b"))
     assert made(sweep, out, shard=Shard(2, 2)).ok == 2  # in the first one's
     assert not (out / "store").exists()
-    assert merge(out, shard_folders(out), BatchOptions(folders=False)).ok == 4
-    assert export_variant(out, rows(out)[3]["folder"], tmp_path / "one", DiskStore(tmp_path / "fresh")).is_dir()
+    assert merged(out, folders=False).ok == 4
+    assert export_variant(out, rows(out)[3]["folder"], tmp_path / "one").is_dir()
     # Where shards were made in several folders there may be several stores all the same.
     made(sweep, tmp_path / "else", shard=Shard(2, 2), store=str(tmp_path / "b"))
     both = [out / "shard-1-of-2", tmp_path / "else" / "shard-2-of-2"]
     with pytest.raises(UnitcadError, match=r"have their results in 2 stores, .* merge with --folders"):
-        merge(tmp_path / "all", both, BatchOptions(folders=False))
+        merged(tmp_path / "all", both, folders=False)
     assert not (tmp_path / "all").exists()
-    assert merge(tmp_path / "all", both, BatchOptions(cache=tmp_path / "fresh", folders=True)).ok == 4
+    assert merged(tmp_path / "all", both, cache=tmp_path / "fresh", folders=True).ok == 4
     assert len(list((tmp_path / "all").glob("ring-*"))) == 4
 
 
@@ -182,21 +200,22 @@ def test_a_store_in_which_nobody_may_write_is_refused_at_once(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("lost", ["packs", "content", "unitcad-store"])
-def test_a_merge_of_what_the_store_has_lost_leaves_nothing(lost, tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
-    for number in (1, 2):
-        made(sweep, out, shard=Shard(number, 2))
+def test_a_merge_of_what_the_store_has_lost_leaves_nothing_and_names_what_makes_it_again(lost, four, tmp_path):
+    _, out = both_shards(four)
     kept = sorted(path for path in (out / "store" / lost).rglob("*") if path.is_file())
-    if lost == "content":
-        kept = kept[-1:]  # not all: some folders are made before it is missed
-    for path in kept or [out / "store" / lost]:
-        path.unlink()
+    # Not all content: some folders are made before it is missed.
+    lose(kept[-1:] if lost == "content" else kept or [out / "store" / lost])
     before = sorted(out.iterdir())
+    why = "there is no store" if lost == "unitcad-store" else "--verify makes missing contents again"
     for folders in (True, False) if lost != "content" else (True,):
-        record_packs.store_at.cache_clear()
-        with pytest.raises(UnitcadError, match=r"--verify makes missing contents again|there is no store"):
-            merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=folders))
+        with pytest.raises(UnitcadError, match=why):
+            merged(out, cache=tmp_path / "fresh", folders=folders)
         assert sorted(out.iterdir()) == before
+    if lost == "content":
+        lose(kept)
+        merged(out, cache=tmp_path / "fresh", folders=False)
+        with pytest.raises(UnitcadError, match="the same batch with --verify makes missing contents again"):
+            export_variant(out, rows(out)[0]["folder"], tmp_path / "one")
 
 
 def test_a_merge_takes_no_option_that_it_does_not_read(tmp_path):
@@ -220,66 +239,39 @@ def test_without_folders_one_is_made_when_asked_for(tmp_path, monkeypatch):
     assert not list(out.glob("ring-*"))
     made(sweep, tmp_path / "plain", folders=True)
     wanted = rows(out)[4]["folder"]
-    cache = DiskStore(tmp_path / "fresh")
-    assert export_variant(out, wanted[-12:-6], tmp_path / "some", cache) == tmp_path / "some" / wanted
-    plain = {path: sha for path, sha in bytes_of(tmp_path / "plain").items() if path.startswith(wanted)}
-    assert bytes_of(tmp_path / "some") == plain != {}
+    assert export_variant(out, wanted[-12:-6], tmp_path / "some") == tmp_path / "some" / wanted
+    assert bytes_of(tmp_path / "some") == results_of(tmp_path / "plain", wanted) != {}
     for wrong, words in (("ffffffffffff", "no variant"), ("nonsense", "needs 4 to 12"), ("../x", "needs 4 to 12")):
         with pytest.raises(WrongArgument, match=words):
-            export_variant(out, wrong, tmp_path / "some", cache)
+            export_variant(out, wrong, tmp_path / "some")
     with pytest.raises(UnitcadError, match="is not in a store, its folder is its result"):
-        export_variant(tmp_path / "plain", wanted[-12:], tmp_path / "some", cache)
+        export_variant(tmp_path / "plain", wanted[-12:], tmp_path / "some")
     with pytest.raises(UnitcadError, match="--batch names the folder of a batch"):
-        export_variant(tmp_path, wanted[-12:], tmp_path / "some", cache)
+        export_variant(tmp_path, wanted[-12:], tmp_path / "some")
 
 
-def test_folders_asked_for_later_are_made_of_what_is_kept(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+def test_folders_asked_for_later_are_made_of_what_is_kept(four, tmp_path):
+    sweep, out = four
     made(sweep, out, folders=False, cache=tmp_path / "one")
-    folder = rows(out)[0]["folder"]
     before = len(calls(tmp_path / "s"))
     summary = made(sweep, out, folders=True, cache=tmp_path / "two")
     assert (summary.ok, summary.resumed, len(calls(tmp_path / "s"))) == (4, 4, before)
     made(sweep, tmp_path / "plain", folders=True, cache=tmp_path / "one")
-    plain = bytes_of(tmp_path / "plain")
-    assert {path: sha for path, sha in bytes_of(out).items() if path.startswith("ring-")} == {
-        path: sha for path, sha in plain.items() if path.startswith("ring-")
-    }
+    assert results_of(out) == results_of(tmp_path / "plain")
     # What the store has lost is made anew.
-    for path in (out / "store" / "packs").rglob("*"):
-        path.unlink() if path.is_file() else None
-    (out / folder / "manifest.json").unlink()
-    record_packs.store_at.cache_clear()
+    lose((out / "store" / "packs").rglob("*"))
+    (out / rows(out)[0]["folder"] / "manifest.json").unlink()
     summary = made(sweep, out, folders=True, cache=tmp_path / "two")
     assert (summary.ok, summary.resumed) == (4, 3)
-
-
-def test_what_makes_lost_content_again_is_named(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=1), tmp_path / "out"
-    for number in (1, 2):
-        made(sweep, out, shard=Shard(number, 2))
-    for path in (out / "store" / "content").rglob("*"):
-        if path.is_file():
-            path.unlink()
-    record_packs.store_at.cache_clear()
-    with pytest.raises(
-        UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes missing contents again"
-    ):
-        merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=True))
-    merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=False))
-    folder = rows(out)[0]["folder"]
-    with pytest.raises(UnitcadError, match="the same batch with --verify makes missing contents again"):
-        export_variant(out, folder, tmp_path / "one", DiskStore(tmp_path / "fresh"))
 
 
 def test_parquet_has_the_rows_of_the_json(tmp_path, monkeypatch):
     parquet = pytest.importorskip("pyarrow.parquet")
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3)
     made(sweep, tmp_path / "out", tables=("json", "parquet"))
-    rows_there = read_parquet(tmp_path / "out" / "variants.parquet")["variants"]
-    assert [{key: value for key, value in row.items() if value is not None} for row in rows_there] == rows(
-        tmp_path / "out"
-    )
+    there = read_parquet(tmp_path / "out" / "variants.parquet")["variants"]
+    known = [{key: value for key, value in row.items() if value is not None} for row in there]
+    assert known == rows(tmp_path / "out")
     schema = parquet.read_schema(tmp_path / "out" / "variants.parquet")
     head = json.loads((tmp_path / "out" / "batch.json").read_text())
     assert json.loads(schema.metadata[b"unitcad"]) == {k: v for k, v in head.items() if k != "variants"}
@@ -314,7 +306,6 @@ def test_a_column_of_several_kinds_is_text(tmp_path):
 
 def test_without_the_extra_parquet_is_refused_and_tables_are_as_before(tmp_path, monkeypatch):
     monkeypatch.setattr(results, "can_write", lambda: False)
-    monkeypatch.setattr("unitcad.sweeps.results.can_write", lambda: False)
     monkeypatch.setattr(results, "MOST_ROWS", 1)
     head, entries = BatchHead(batch="a", name="b"), [JournalEntry(index=0, status="ok")]
     write_results(tmp_path, ["index"], lambda: entries, head, None, None, 1)

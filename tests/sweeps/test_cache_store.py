@@ -127,7 +127,7 @@ def test_no_room_in_the_cache_is_no_error(tmp_path, monkeypatch):
 
 def test_many_processes_make_each_key_once(tmp_path):
     root, context = tmp_path / "c", multiprocessing.get_context("spawn")
-    with context.Pool(4) as pool:
+    with context.Pool(3) as pool:
         found = pool.starmap(_make_all, [(root, tmp_path / "log")] * 8)
     assert len({tuple(shas) for shas in found}) == 1
     made = (tmp_path / "log").read_text().split()

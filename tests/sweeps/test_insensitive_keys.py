@@ -19,10 +19,12 @@ def swept(base="encapsulating", mode="product", **values):
     return from_file({"base": base, "sweep": {"mode": mode, **paths}}, Path(), "s")
 
 
+def estimated(sweep):
+    return swept_estimate(sweep, sweep.count)
+
+
 def unread(sweep):
-    found = swept_estimate(sweep, sweep.count)
-    assert found is not None
-    return {model: keys for model, keys in found.insensitive.items() if keys}
+    return {model: keys for model, keys in estimated(sweep).insensitive.items() if keys}
 
 
 def test_the_walls_of_the_shipped_sweep_do_not_enter_rule_and_divider():
@@ -46,8 +48,9 @@ def test_the_reading_keys_are_those_that_move_a_level():
 def test_a_key_that_no_model_reads_is_said_once():
     sweep = swept(fpcb__pad_diameter_mm=[8.0, 8.5])
     assert sorted(unread(sweep)) == sorted(MODELS)
-    found = warnings(swept_estimate(sweep, sweep.count))
-    assert found == ["no model of the edge level reads fpcb.pad_diameter_mm: the level stays the same"]
+    assert warnings(estimated(sweep)) == [
+        "no model of the edge level reads fpcb.pad_diameter_mm: the level stays the same"
+    ]
 
 
 def test_keys_of_tooling_casting_and_files_are_no_matter_of_the_estimate():
@@ -74,7 +77,7 @@ def test_a_level_that_is_not_known_says_nothing():
 
 def test_a_batch_of_units_without_estimates_has_none(tmp_path):
     sweep = swept(base=str(Path("templates/custom/strap-lugs.toml").resolve()), diameter_mm=[14.0, 14.5])
-    assert swept_estimate(sweep, sweep.count) is None
+    assert estimated(sweep) is None
     assert warnings(None) == []
 
 
@@ -99,18 +102,23 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("values", "lengths"),
+    ("base", "values", "lengths"),
     [
-        ({"layers__0__wall_mm": [1.25, 1.5]}, {"layers.0.wall_mm": 1.25}),
-        ({"layers__0__wall_mm": [1.25]}, {}),
-        ({"diameter_mm": [14.0, 15.0], "layers__1__cap_mm": [1.0]}, {"diameter_mm": 14.0, "layers.1.cap_mm": 1.25}),
-        ({"layers__0__material": ["ecoflex-00-10", "dragon-skin-10"]}, {}),
+        ("encapsulating", {"layers__0__wall_mm": [1.25, 1.5]}, {"layers.0.wall_mm": 1.25}),
+        ("encapsulating", {"layers__0__wall_mm": [1.25]}, {}),
+        (
+            "encapsulating",
+            {"diameter_mm": [14.0, 15.0], "layers__1__cap_mm": [1.0]},
+            {"diameter_mm": 14.0, "layers.1.cap_mm": 1.25},
+        ),
+        ("encapsulating", {"layers__0__material": ["ecoflex-00-10", "dragon-skin-10"]}, {}),
+        ("single-embedded", {"layers__0__wall_mm": [2.0, 2.5]}, {"layers.0.wall_mm": 2.5}),  # of the measured controls
+        ("three-layer", {"layers__0__wall_mm": [1.0, 1.5]}, {}),
+        (["three-layer", "encapsulating"], {"layers__0__wall_mm": [1.0, 1.5]}, {"layers.0.wall_mm": 1.25}),
     ],
 )
-def test_swept_lengths_that_every_measured_unit_had_alike_are_named(values, lengths):
-    sweep = swept(**values)
-    found = swept_estimate(sweep, sweep.count)
-    assert found is not None
+def test_swept_lengths_that_every_measured_unit_had_alike_are_named(base, values, lengths):
+    found = estimated(swept(base, **values))
     assert found.not_measured == lengths
     told = [line for line in warnings(found) if line.startswith("every measured unit had")]
     assert len(told) == len(set(lengths.values()))
@@ -118,26 +126,5 @@ def test_swept_lengths_that_every_measured_unit_had_alike_are_named(values, leng
 
 
 def test_the_typical_error_is_that_of_the_swept_source_of_moduli():
-    sweep = swept("embedded", estimate__moduli=["quasi-static"], layers__0__wall_mm=[1.2, 1.3])
-    found = swept_estimate(sweep, sweep.count)
-    assert found is not None
+    found = estimated(swept("embedded", estimate__moduli=["quasi-static"], layers__0__wall_mm=[1.2, 1.3]))
     assert found.typical_error["published"] == pytest.approx(leave_one_out(measured_table("quasi-static")), rel=1e-4)
-
-
-def test_a_control_s_wall_is_that_of_the_measured_controls():
-    sweep = swept("single-embedded", layers__0__wall_mm=[2.0, 2.5])
-    found = swept_estimate(sweep, sweep.count)
-    assert found is not None
-    assert found.not_measured == {"layers.0.wall_mm": 2.5}
-
-
-def test_a_wall_of_two_layers_is_the_one_that_was_measured():
-    sweep = from_file({"base": "three-layer", "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "three")
-    three = swept_estimate(sweep, sweep.count)
-    assert three is not None
-    assert three.not_measured == {}
-    both = {"base": ["three-layer", "encapsulating"], "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}
-    sweep = from_file(both, Path(), "both")
-    found = swept_estimate(sweep, sweep.count)
-    assert found is not None
-    assert found.not_measured == {"layers.0.wall_mm": 1.25}

@@ -1,6 +1,6 @@
-"""What other programs say of the corpus, written to verdicts.json beside this file. Run by hand:
+"""What other programs say of the corpus, written for the tests. Run by hand:
 
-    python make_verdicts.py --lib3mf /path/to/python-with-lib3mf
+    python benchmarks/check_verdicts.py --lib3mf /path/to/python-with-lib3mf
 
 trimesh runs in this Python; admesh and prusa-slicer are Debian's; lib3mf's wheel has an environment of its own.
 A verdict is `pass`, `altered` (read, and changed or found in need of repair), `fail`, `hang` (20 s) or `-` (not read).
@@ -13,8 +13,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-HERE = Path(__file__).parent
-CORPUS = HERE.parent.parent / "corpus"
+TESTS = Path(__file__).parents[1] / "tests"
+CORPUS, VERDICTS = TESTS / "corpus", TESTS / "meshcheck" / "peers" / "verdicts.json"
 LIB3MF = """
 import json, sys
 import lib3mf
@@ -107,7 +107,7 @@ def main():
         }
         for path in paths
     }
-    (HERE / "verdicts.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    VERDICTS.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
 
 
 if __name__ == "__main__":
