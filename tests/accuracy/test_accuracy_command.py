@@ -125,7 +125,7 @@ def test_a_cylinder_is_as_far_off_as_its_area_true_polygon():
         dimensions=SimpleNamespace(outer_radius=radius),
         spec=SPEC,
     )
-    rows = mesh_rows(moulds, lambda stage: None, repeats=1)  # type: ignore[arg-type]
+    rows = mesh_rows(moulds, lambda stage: None, repeats=1)
     for row in rows:
         assert row["distance_mm"] == pytest.approx(radius * (area_true(row["segments"]) - 1), rel=1e-6)
         assert row["distance_mm"] == pytest.approx(row["distance_bound_mm"], rel=1e-6)

@@ -1,14 +1,11 @@
 """An array's folder: complete, the same bytes again, built again from its own array.toml."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import io
 import json
 import re
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,18 +40,18 @@ SMALL = [
 
 
 @pytest.fixture(scope="module")
-def store() -> MemoryStore:
+def store():
     return MemoryStore()
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, store: MemoryStore) -> Path:
+def folder(tmp_path_factory, store):
     built = build_array(load_array("forearm-pockets", SMALL), tmp_path_factory.mktemp("out"), store=store)
     assert built.ok
     return built.folder
 
 
-def _contents(folder: Path) -> dict[str, bytes]:
+def _contents(folder):
     files = (path for path in folder.rglob("*") if path.is_file() and path.name != "timings.json")
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 

@@ -1,7 +1,5 @@
 """The commands know arrays: init, schema, list, build and report."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

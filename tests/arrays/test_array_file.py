@@ -1,18 +1,14 @@
 """Array files: layouts give their points, what does not fit is refused with a value that does."""
 
-from __future__ import annotations
-
 import gc
 import math
 from itertools import combinations
-from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 
 import unitcad
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
@@ -22,11 +18,11 @@ from unitcad.errors import Refusal
 from unitcad.validation import compound_kind, default_template, load, templates
 
 
-def _array(layout: dict[str, Any], **more: Any) -> Array:
+def _array(layout, **more):
     return load_array({"name": "a", "array": "pockets", "unit": default_template(), "layout": layout, **more})
 
 
-def _nearest(array: Array) -> list[float]:
+def _nearest(array):
     at = [(p.x, p.y) for p in array.places]
     return [min(math.dist(p, q) for q in at if q != p) for p in at]
 

@@ -1,7 +1,5 @@
 """What an array warns of: too many motors for its circuit's width, a groove drawn less deep than asked for."""
 
-from __future__ import annotations
-
 import json
 from html import escape
 

@@ -1,13 +1,11 @@
 """Back sheets: every mould check holds on their tools, and a fault drawn into one is caught by its code."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import pytest
 
-from tests.arrays.made_arrays import Change, less, made, more, notch, with_tool
+from tests.arrays.made_arrays import less, made, more, notch, with_tool
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import mould_checks
@@ -38,7 +36,7 @@ def test_a_cup_goes_on_the_pins_in_one_attitude_only():
 
 
 # Units at -20, 0, 20; cup 1: bore 5.75, groove 6.75 to 8.25; cup 2: groove from 31 to 32.5 at y, pins at y = 35.45.
-FAULTS: list[tuple[str, str, str, Change]] = [
+FAULTS = [
     ("C230", "cup1", "a pin's hole into a groove", less(moved(cylinder(2.15, -1, 2.5), 0, 7.5))),
     ("C230", "cup2", "a pin's hole into the groove", less(moved(cylinder(2.15, -1, 3.7), 10, 31.75))),
     ("C240", "cup2", "a pin's hole 0.5 from a bore", less(moved(cylinder(2.15, -1, 2.4), 0, 29.6))),

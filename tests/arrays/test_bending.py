@@ -1,7 +1,5 @@
 """An array round its limb: which length is kept, how the ring closes, what is stretched."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

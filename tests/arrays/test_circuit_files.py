@@ -11,10 +11,8 @@ import ezdxf
 import numpy as np
 import pytest
 
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit import (
-    Wiring,
     circuit_body,
     circuit_dxf,
     circuit_svg,
@@ -35,7 +33,7 @@ LAYOUTS = {
 }
 
 
-def made(name: str) -> Array:
+def made(name):
     layout, circuit = LAYOUTS[name]
     unit = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
     return load_array({"name": name, "array": "back-sheet", "unit": unit, "layout": layout, "circuit": circuit})
@@ -44,7 +42,7 @@ def made(name: str) -> Array:
 ARRAYS = {name: made(name) for name in LAYOUTS}
 
 
-def _away(laid: Wiring, at: np.ndarray) -> np.ndarray:
+def _away(laid, at):
     """The distance of points from pads and strips, by the definitions of a disc and of a rectangle."""
     found = [np.hypot(at[:, 0] - pad.x, at[:, 1] - pad.y) - pad.radius for pad in laid.pads]
     for strip in laid.strips:
@@ -60,7 +58,7 @@ def _away(laid: Wiring, at: np.ndarray) -> np.ndarray:
     return np.min(found, axis=0)
 
 
-def _inside(profile: Profile, at: np.ndarray) -> np.ndarray:
+def _inside(profile, at):
     corners = points(profile, 2000)
     x0, y0 = corners.T
     x1, y1 = np.roll(corners, -1, axis=0).T
@@ -102,7 +100,7 @@ def test_a_corner_that_reaches_into_a_units_wall_is_refused_with_what_fits():
     with pytest.raises(Refusal, match="notch") as refused:
         outline(array)
     assert refused.value.field == "circuit.corner_mm"
-    assert 1.0 <= refused.value.nearest < 4.0  # type: ignore[operator]
+    assert 1.0 <= refused.value.nearest < 4.0
     outline(load_array(array, [f"circuit.corner_mm={refused.value.nearest}"]))
 
 
@@ -140,7 +138,7 @@ def test_the_kicad_board_has_one_closed_edge():
     for line, (start, end) in zip(arcs, [s for s in sides(drawn.vertices) if s[0][2]], strict=True):
         p, m, q = (
             np.array(re.search(rf"\({key} (\S+) (\S+)\)", line).groups(), float) for key in ("start", "mid", "end")
-        )  # type: ignore[union-attr]
+        )
         radius = arc_centre(start[:2], end[:2], start[2])[2]
         a, b, c = (np.linalg.norm(v) for v in (p - m, m - q, q - p))
         area = abs((m - p)[0] * (q - p)[1] - (m - p)[1] * (q - p)[0]) / 2

@@ -9,7 +9,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit import outline
 from unitcad.arrays.crosstalk import (
@@ -31,11 +30,11 @@ from unitcad.estimate_inputs import estimate_input, estimate_spec
 UNIT = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
 
 
-def array(layout: dict, **tables: object) -> Array:
+def array(layout, **tables):
     return load_array({"name": "test", "array": "pockets", "unit": UNIT, "layout": layout, **tables})
 
 
-def grid(columns: int, rows: int, pitch: float, **tables: object) -> Array:
+def grid(columns, rows, pitch, **tables):
     return array({"kind": "grid", "columns": columns, "rows": rows, "pitch_mm": pitch}, **tables)
 
 
@@ -43,7 +42,7 @@ NINE = grid(3, 3, 20.0)
 DATA = crosstalk(NINE, masses=True)
 
 
-def _scattered(seed: int, count: int, other: str = "") -> Array:
+def _scattered(seed, count, other=""):
     rng, points = np.random.default_rng(seed), []
     while len(points) < count:
         at = rng.uniform(0, 26 * math.sqrt(count), 2).tolist()

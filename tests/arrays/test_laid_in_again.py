@@ -1,28 +1,24 @@
 """Casts that are taken out and laid in elsewhere, and silicone that comes out in parts: C200 and C300."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import draw, overlap
-from unitcad.moulds.pieces import CAST, Removal, Way
-from unitcad.moulds.plan import Step
-from unitcad.shape import Shape, box, cut, cylinder, moved, rotated
+from unitcad.moulds.pieces import CAST, Removal
+from unitcad.shape import box, cut, cylinder, moved, rotated
 
 UP, DOWN = (0, 0, 1), (0, 0, -1)
 
 
 @cache
-def patch() -> PatchMoulds:
+def patch():
     return patch_moulds(load_array("forearm-patch", ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3,6]"]))
 
 
-def with_steps(*steps: Step) -> PatchMoulds:
+def with_steps(*steps):
     return patch_moulds(patch().arranged, replace(patch().plan, steps=steps))
 
 
@@ -49,11 +45,11 @@ def test_a_layer_is_laid_in_elsewhere_only_once_it_was_taken_out():
         assert found == wrong
 
 
-def slanted(degrees: float, x: float) -> Shape:
+def slanted(degrees, x):
     return moved(rotated(cylinder(3, -4, 9), "y", degrees), x)
 
 
-def parted(ways: Sequence[Way], parts: Sequence[Shape | None]) -> list[str]:
+def parted(ways, parts):
     """What C300 finds on silicone with two pegs in a block, at 25 degrees to either side of the vertical."""
     pegs = [slanted(side * 25, side * 10) for side in (-1, 1)]
     room = box(-30, 30, -10, 10, 2, 4)

@@ -1,17 +1,14 @@
 """Back sheets whose like cells are judged once have the findings that every cell has alone, sound and with faults."""
 
-from __future__ import annotations
-
 import pytest
 
-from tests.arrays.made_arrays import Change, findings, made, more, with_tool
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from tests.arrays.made_arrays import findings, made, more, with_tool
+from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds, overlap
-from unitcad.checks.finding import MouldFinding
 from unitcad.shape import box, cylinder, moved
 
 
-def findings_of_each_cell(moulds: PatchMoulds, monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
+def findings_of_each_cell(moulds, monkeypatch):
     """Return what the checks find where no place stands for another."""
     alone = patch_moulds(moulds.arranged, moulds.altered)
     alone.__dict__["cells"] = (tuple(range(len(moulds.plan.layout.cells))),) * len(moulds.plan.steps)
@@ -20,7 +17,7 @@ def findings_of_each_cell(moulds: PatchMoulds, monkeypatch: pytest.MonkeyPatch) 
         return [shown(finding) for finding in check_moulds(alone)]
 
 
-def shown(finding: MouldFinding) -> tuple:
+def shown(finding):
     """A finding, its value to six decimals; of overlaps that hold the largest is one of rounding, whichever it is."""
     where = finding.where.split(":")[0] if finding.code == "C200" and finding.ok else finding.where
     return finding.code, where, finding.ok, round(finding.value, 6), round(finding.limit, 6)
@@ -49,7 +46,7 @@ def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_t
 
 ROWS = "forearm-patch", "layout.rows=2", "sheet.strap_slot_mm=[3,8]"
 # Units stand at -20, 0 and 20 along x, at -10 and 10 along y: bores of 5.75, cores of 4.6, 2.11 high.
-FAULTS: dict[str, tuple[str, str, Change]] = {
+FAULTS = {
     "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, -4.5, -4, 1, 2))),
     "a core of the middle 0.2 too high": ("C200", "base", more(moved(cylinder(3, 0, 2.31), 0, -10))),
     "a knob on a core": ("C300", "base", more(moved(cylinder(4.7, 1.0, 1.4), 20, 10))),

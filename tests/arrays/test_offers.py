@@ -1,9 +1,6 @@
 """What a refusal of an array offers is put in, and accepted; where more has to change, its sentence says what."""
 
-from __future__ import annotations
-
 import re
-from typing import Any
 
 import pytest
 
@@ -25,7 +22,7 @@ _RESIN = {"moulds.printer": "sla"}
 
 
 TWELVE = {"layout.columns": 12, "moulds.cavities": [1, 1], "moulds.bed_x_mm": 30}
-OFFERED: list[tuple[str, dict[str, Any], str]] = [
+OFFERED = [
     ("forearm-patch", {"layout.pitch_mm": 15}, "layout.pitch_mm"),
     ("forearm-patch", {"sheet.thickness_mm": 2}, "sheet.thickness_mm"),
     ("forearm-patch", {"moulds.pour": "injected"}, "moulds.pour"),
@@ -60,7 +57,7 @@ def test_what_can_not_be_cast_is_refused_with_what_would(name, changes, field):
         assert "silicone" in str(refused), "what the seams would take up"
 
 
-REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
+REFUSED = [
     ("forearm-patch", {"unit": "embedded"}, "unit.design", "encapsulating"),
     ("forearm-patch", {"unit": "no-fpcb"}, "unit.fpcb", None),
     ("forearm-patch", {"sheet.hold_mm": 0.2}, "sheet.hold_mm", None),
@@ -89,7 +86,7 @@ def test_what_can_not_be_made_is_refused(name, changes, field, nearest):
     assert (refused.field, refused.nearest) == (field, nearest)
 
 
-def named(limit: str, before: str, after: str) -> dict[str, Any]:
+def named(limit, before, after):
     """Return what a sentence names between two words, by paths."""
     (part,) = re.findall(f"{before} (.*?)(?: {after}|;|$)", limit)
     pairs = re.findall(r"([a-z_.0-9]+) = ('?)([^' ]+)", part)

@@ -1,7 +1,5 @@
 """Marks are unmistakable: no set's label reads as a base's or a cup's, and pieces of a split tool carry it whole."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.arrays.made_arrays import made
@@ -34,7 +32,7 @@ def test_every_piece_of_a_split_tool_carries_mark_label_and_number():
             assert lost == pytest.approx(letters, abs=0.05), piece.name
 
 
-def _area(text: str, stroke: float) -> float:
+def _area(text, stroke):
     return realise(engraving(text, stroke, 0.0, 1.0), 24).volume()
 
 

@@ -1,9 +1,5 @@
 """Arrays of every construction and many sizes keep every mould check, and each tool prints without support."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 from tests.arrays.made_arrays import findings, made
@@ -54,12 +50,12 @@ BACK_SHEET = {"name": "other", "array": "back-sheet", "unit": "encapsulating"}
 NARROW = {"kind": "grid", "columns": 1, "rows": 3, "pitch_mm": 17.54}
 
 
-def tape(like: str, columns: int, pitch: int) -> dict[str, Any]:
+def tape(like, columns, pitch):
     layout = {"kind": "grid", "columns": columns, "rows": 1, "pitch_mm": pitch}
     return {**BACK_SHEET, "unit": {"like": like}, "layout": layout}
 
 
-OTHERS: dict[str, dict[str, Any]] = {
+OTHERS = {
     # A seam's tooth and a notch's window stop the groove between them: a slit of 0.031 mm stayed beside a tape's.
     "tape": tape("motor-10mm", 10, 25),
     "label as deep as its shallow groove": {
@@ -70,7 +66,7 @@ OTHERS: dict[str, dict[str, Any]] = {
         "layout": {"kind": "grid", "columns": 2, "rows": 2, "pitch_mm": 24},
     },
 }  # fmt: skip
-LONG: dict[str, dict[str, Any]] = {
+LONG = {
     "narrow tape": tape("motor-10mm", 10, 24),
     "tape of larger units": tape("encapsulating", 12, 23),
     "x and y": {

@@ -1,9 +1,6 @@
 """Tools larger than the bed along y, along both axes, and of hexagons: a grid of pieces whose seams cross."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise
@@ -14,18 +11,18 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_page import take_apart
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.constructions.back_sheet import drawing_of
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.piece_seams import weep
 from unitcad.checks import mould_checks
 from unitcad.geometry.segments import between_convex, to_segment
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.moulds.cuts import BESIDE, Split, split, straight
+from unitcad.moulds.cuts import BESIDE, split, straight
 from unitcad.moulds.pieces import base_piece
-from unitcad.shape import Shape, box, cut, moved
+from unitcad.shape import box, cut, moved
 
 TWO = ["layout.rows=2", "layout.columns=2"]
 BED = {"x": "moulds.bed_x_mm", "y": "moulds.bed_y_mm"}
-ARRAYS: dict[str, tuple[str, list[str]]] = {
+ARRAYS = {
     "band": ("wrist-band", []),
     "patch, y": ("forearm-patch", ["layout.rows=6", "layout.columns=1", f"{BED['y']}=110"]),
     "patch, x and y": ("forearm-patch", ["layout.pitch_mm=110", *TWO, f"{BED['x']}=140", f"{BED['y']}=140"]),
@@ -38,7 +35,7 @@ MOSTLY = [pytest.param(name, marks=pytest.mark.long if name == "patch, x and y" 
 
 
 @cache
-def made(name: str) -> PatchMoulds:
+def made(name):
     template, overrides = ARRAYS[name]
     return patch_moulds(load_array(template, overrides))
 
@@ -96,7 +93,7 @@ def test_the_silicone_in_the_seams_is_what_c250_measures(name):
     assert weep(moulds.arranged, tool.seams, (x0, y0, x1, y1), heights) == pytest.approx(found.value, rel=0.03)
 
 
-def plate() -> Split:
+def plate():
     drawn = base_piece(box(-60, 60, -50, 50, 0, 5))
     seams = [straight(-10.0, [(-45, 15), (30, 45)], 0.15), straight(20.0, [(-55, 0), (20, 55)], 0.15, "y")]
     return split(drawn, seams)
@@ -116,8 +113,7 @@ def test_where_seams_cross_four_square_corners_meet():
         assert pieces[one].min_gap(pieces[other], 1) == pytest.approx(near, abs=3 / 1024)
 
 
-Change = Callable[[Shape], Shape]
-FAULTS: list[tuple[str, str, float, Change]] = [
+FAULTS = [
     ("narrowest gap", "the play along y, not square to the flank", 0.0, lambda shape: moved(shape, 0, 0.15)),
     ("where seams cross", "a corner broken off", 0.15, lambda shape: cut(shape, [box(-0.3, 0, 0, 0.3, -99, 99)])),
 ]

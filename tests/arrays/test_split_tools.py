@@ -1,9 +1,6 @@
 """Tools larger than the bed: cut between features, joined by dovetails with the play square to the flank, judged."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -17,10 +14,10 @@ from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import mould_checks
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.cuts import FLANK_DEG, LARGE, ROUND, Feature, Seam, Sized, in_gaps, seams, split, straight
+from unitcad.moulds.cuts import FLANK_DEG, LARGE, ROUND, Feature, Sized, in_gaps, seams, split, straight
 from unitcad.moulds.pieces import base_piece
 from unitcad.pipeline.plan import file_stem
-from unitcad.shape import Common, Shape, box, cut, moved, union
+from unitcad.shape import Common, box, cut, moved, union
 
 band = partial(made, "wrist-band")
 
@@ -48,8 +45,7 @@ def test_the_gap_is_the_play_times_the_line():
         assert one.min_gap(other, 1) == pytest.approx(play, abs=2 / 1024)
 
 
-Change = Callable[[Shape], Shape]
-FAULTS: list[tuple[str, str, float, Change]] = [
+FAULTS = [
     ("narrowest gap", "no play", 0.0, lambda shape: shape),
     ("narrowest gap", "the play along x, not square to the flank", 0.0, lambda shape: moved(shape, 0.15)),
     ("overlap", "a piece 0.5 too far in", 0.15, lambda shape: moved(shape, -0.5)),
@@ -60,7 +56,7 @@ FAULTS: list[tuple[str, str, float, Change]] = [
 ]
 
 
-def knobs(shape: Shape) -> Shape:
+def knobs(shape):
     return union((shape, box(28, 35, -0.5, 0.5, 9, 9.5), box(28, 35, -0.5, 0.5, -3, -2.5), box(35, 36, -1, 1, -3, 9.5)))
 
 
@@ -115,7 +111,7 @@ def test_too_many_seams_weep_too_much():
     assert [f.ok for f in found] == [True, False]
 
 
-def cut_at(bed: float, other: Sequence[Seam] = ()) -> list[float]:
+def cut_at(bed, other=()):
     """Cut a tool 220 mm long, a feature 12 mm wide every 20 mm."""
     features = tuple(
         Feature(((x - 6.0, -30), (x + 6.0, -30), (x + 6.0, 30), (x - 6.0, 30))) for x in range(-100, 101, 20)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit import LEAST_BEND, wiring
 from unitcad.errors import Refusal
@@ -20,11 +19,11 @@ NINE = {
 WIDE = {"kind": "grid", "columns": 2, "rows": 2, "pitch_mm": 30.0}
 
 
-def nine(**tables: object) -> Array:
+def nine(**tables):
     return load_array({**NINE, **tables})
 
 
-def over(array: Array, *sets: str) -> Array:
+def over(array, *sets):
     return load_array(array, sets)
 
 

@@ -1,7 +1,5 @@
 """`unitcad fit`: its file and results, cast records in it, the shrunk fits, and a fit in `estimate` and `build`."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from dataclasses import replace
@@ -426,7 +424,7 @@ def test_a_linear_model_is_generalised_least_squares(name, between, for_lab):
 @pytest.mark.parametrize("moduli", ["small-strain", "quasi-static", "data sheet"])
 def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
     """The other implementation masks units in closed forms; so do the scores by source that were measured before."""
-    table = measured_table(moduli)  # type: ignore[arg-type]
+    table = measured_table(moduli)
     alone = Campaigns(table, np.zeros(9, dtype=bool), np.zeros(9))
     judged = {name: judge(model, alone) for name, model in MODELS.items()}
     for name, one in assess_all(table).items():
@@ -506,7 +504,7 @@ def test_a_spec_names_its_fit_and_stands_alone(fit_file, tmp_path):
     fit_file.unlink()
     again = load(spec, {"layers.0.wall_mm": 1.3})
     assert again.estimate.fit_source == spec.estimate.fit_source
-    changed = spec.estimate.fit_source.replace('"synthetic-bench"', '"other"')  # type: ignore[union-attr]
+    changed = spec.estimate.fit_source.replace('"synthetic-bench"', '"other"')
     (tmp_path / "other.toml").write_text(changed)
     other = load(spec, {"estimate.fit": str(tmp_path / "other.toml")})
     assert estimate_spec(other)["fit"]["name"] == "other"

@@ -1,7 +1,5 @@
 """`unitcad material`: layouts and units, methods on exact curves, the table of a spec, refusals, dynamic tests."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

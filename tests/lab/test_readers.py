@@ -1,7 +1,5 @@
 """Readers of recordings: every format and layout gives the same columns, nothing is guessed, no damage passes."""
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path

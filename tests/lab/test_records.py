@@ -48,7 +48,7 @@ def severities(result):
 
 
 def fitted(x, rate=RATE, **options):
-    fit = fit_line(x, rate, **options)  # type: ignore[arg-type]
+    fit = fit_line(x, rate, **options)
     assert fit is not None
     return fit
 
