@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 from scipy.optimize import curve_fit
+from signals import RATE, TIME, noise, wave
 
 from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, Scenario, synthetic
 from unitcad.errors import Refusal
@@ -14,18 +15,8 @@ from unitcad.lab.chains import ChainTable, Mains, bandpass
 from unitcad.lab.chains.line import DROP_OUT, fit_line, running_part
 from unitcad.lab.record import measure_record
 
-RATE = 2000
-TIME = np.arange(2 * RATE) / RATE
 SENSOR = SensorTable(quantity="displacement", unit="um")
 BAND = (60.0, 250.0)
-
-
-def noise(size=1.0, seed=1):
-    return size * np.random.default_rng(seed).standard_normal(len(TIME))
-
-
-def wave(size, hertz, phase=0.0):
-    return size * np.cos(2 * np.pi * hertz * TIME + phase)
 
 
 def turning(size, hertz):
@@ -49,7 +40,6 @@ def severities(result):
 
 def fitted(x, rate=RATE, **options):
     fit = fit_line(x, rate, **options)
-    assert fit is not None
     return fit
 
 
