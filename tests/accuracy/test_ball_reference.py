@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.ball_reference import Kernel, TooHard, response
+from benchmarks.accuracy.ball_reference import Kernel, response
 from unitcad.accuracy.random_media import CLASSES, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc
@@ -53,8 +53,7 @@ def test_the_reference_gives_boussinesqs_disc_and_point():
     assert np.max(np.abs(point - exact)) < 1e-9 * exact[0]
 
 
-@pytest.mark.parametrize("z", [0.0, 2e-3, 31e-3])
-@pytest.mark.parametrize("k", [20.0, 300.0 + 15j, 2000.0])
+@pytest.mark.parametrize(("z", "k"), [(0.0, 20.0), (2e-3, 300.0 + 15j), (31e-3, 2000.0)])
 @pytest.mark.parametrize("base", [BONE, HalfSpace(1000, 0.0, 0.3)], ids=["bone", "free"])
 def test_its_kernel_is_the_compliance(k, z, base):
     medium = LayeredMedium(FOREARM, base)
@@ -126,18 +125,7 @@ SLOW = ("partly damped", "undamped")
 @pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.long if one in SLOW else ()) for one in CLASSES])
 def test_errors_hold_on_random_media(kind):
     one = trial(kind, 1)
-    assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-3, 1e-5, 1e-7, 1e-9))) <= 1
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", CLASSES)
-@pytest.mark.parametrize("seed", range(100, 190))
-def test_errors_hold_on_many_random_media(kind, seed):
-    one = trial(kind, seed)
-    try:
-        assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-3, 1e-5, 1e-7, 1e-9))) <= 1
-    except TooHard as reason:
-        pytest.skip(f"too hard for the reference: {reason}")
+    assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-5, 1e-9))) <= 1
 
 
 def test_the_response_without_damping_is_bounded_where_its_limit_converges_slowly():

@@ -24,7 +24,7 @@ def _components(found):
     return (np.array([getattr(found, f"{what}_{name}") for name in names]) for what in ("u", "error"))
 
 
-@pytest.mark.parametrize("rtol", [0.1, 1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("rtol", [0.1, 1e-5, 1e-9])
 @pytest.mark.parametrize("reference", REFERENCES, ids=[reference["kind"] for reference in REFERENCES])
 def test_the_error_of_each_component_holds_without_damping(reference, rtol):
     """A polynomial through six small losses was off by up to 2.3 times the error of one component.
