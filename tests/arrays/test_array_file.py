@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import unitcad
+from tests.refusals import refuses
 from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.sheet import rounded
 from unitcad.arrays.tails import tails
-from unitcad.errors import Refusal
 from unitcad.validation import compound_kind, default_template, load, templates
 
 
@@ -34,7 +34,6 @@ def test_a_template_settles_to_data_that_give_the_same_array(name):
     assert load_array(msgspec.json.decode(msgspec.json.encode(array.asked))) == array
     for source in (name, array_templates()[name]):
         kind = compound_kind(source)
-        assert kind is not None
         assert kind.name == "array"
     assert compound_kind(default_template()) is None
 
@@ -75,17 +74,13 @@ def test_listed_points_keep_their_distances():
 
 _GRID = {"kind": "grid", "columns": 3, "rows": 3, "pitch_mm": 20}
 REFUSED = [
-    ({"layout": {**_GRID, "pitch_mm": 12}}, "layout.pitch_mm", 18),
     ({"layout": {**_GRID, "pitch_mm": [20, 12]}}, "layout.pitch_mm.1", 16),
-    ({"layout": {**_GRID, "pitch_mm": -3}}, "layout.pitch_mm", 18),
-    ({"layout": {"kind": "hex", "pitch_mm": 10}}, "layout.pitch_mm", 18),
     ({"layout": {"kind": "ring", "count": 30}, "limb": {"radius_mm": 40}}, "layout.count", 13),
     ({"layout": {"kind": "ring", "count": 4}}, "limb.radius_mm", 40),
     ({"layout": {"kind": "ring", "count": 4, "bands": 2}, "limb": {"radius_mm": 40}}, "layout.band_pitch_mm", 40),
     ({"layout": {"kind": "list", "points_mm": [[0, 0], [10, 0]]}}, "layout.points_mm.1", [16, 0]),
     ({"layout": {"kind": "list", "points_mm": [[3, 3], [3, 3]]}}, "layout.points_mm.1", [19, 3]),
     ({"layout": {"kind": "grd"}}, "layout.kind", "grid"),
-    ({"layout": {**_GRID, "rings": 2}}, "layout.rings", None),
     ({"place": [{"at": [4, 1]}]}, "place.0.at", [3, 1]),
     ({"place": [{"at": "B4"}]}, "place.0.at", None),
     ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", 27),
@@ -107,9 +102,9 @@ REFUSED = [
 
 @pytest.mark.parametrize(("change", "field", "nearest"), REFUSED, ids=lambda value: str(value)[:40])
 def test_what_does_not_fit_is_refused_with_what_does(change, field, nearest):
-    with pytest.raises(Refusal) as refused:
+    with refuses(field) as refused:
         _array(**{"layout": _GRID, **change})
-    assert (refused.value.field, refused.value.nearest) == (field, nearest)
+    assert refused.value.nearest == nearest
 
 
 @pytest.mark.parametrize("rows", [1, 2])
@@ -164,9 +159,7 @@ def test_no_table_lets_the_decoder_read_beyond_its_memory():
         gc.collect()
 
 
-def test_python_takes_changes_as_a_dict_and_load_refuses_arrays():
-    array = load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
-    assert array.places[1].x - array.places[0].x == 25
-    for source in ("forearm-pockets", {"array": "pockets"}):
-        with pytest.raises(unitcad.UnitcadError, match="an array of units"):
-            unitcad.load(source)
+@pytest.mark.parametrize("source", ["forearm-pockets", {"array": "pockets"}])
+def test_load_refuses_arrays(source):
+    with pytest.raises(unitcad.UnitcadError, match="an array of units"):
+        load(source)

@@ -94,8 +94,8 @@ def test_each_piece_of_a_long_tool_is_held_down():
 
 
 def test_a_pour_that_outlasts_its_pot_life_is_warned_of():
-    """144 cavities take half a minute each; nine do not."""
-    large = load_array("forearm-patch", ["layout.columns=12", "layout.rows=12"])
+    """56 cavities take half a minute each; nine do not."""
+    large = load_array("forearm-patch", ["layout.columns=8", "layout.rows=7"])
     for array, late in ((large, True), (load_array("forearm-patch"), False)):
         moulds = patch_moulds(array)
         pours = array_procedure(moulds, [100.0] * 2, 1000.0, {}).pours

@@ -75,14 +75,10 @@ def at(shape, degrees):
 
 
 SLANT = math.degrees(10 / (R + 4.3545))
-PINS = pair().plan.steps[-1].pins
-assert PINS is not None
-PIN, SEAT = PINS.places[0], PINS.seat
+SEAT = pair().plan.steps[-1].pins.seat
 FAULTS = [
     ("C100", "lid2", "a seam across the land", less(box(-0.2, 0.2, 5, 40, 4.5, 5.5))),
-    ("C100", "base2", "a moat 0.1 too deep", less(at(cylinder(7, -0.1, 1), SLANT))),
     ("C200", "base2", "a core 0.05 too high", more(at(cylinder(4, 0, 2.16), SLANT))),
-    ("C210", "base2", "a pin 0.1 too thick", more(moved(cylinder(2.1, SEAT, SEAT + 2), *PIN))),
     ("C220", "lid2", "holes for the pins too wide", less(box(-99, 99, -99, 99, SEAT - 1, SEAT + 3))),
     ("C300", "base2", "a knob on a slanted core", more(at(cylinder(4.7, 1.0, 1.4), SLANT))),
     ("C400", "lid2", "the vents of an end that are shut", more(box(-4, 4, 8, 11, 5.1, 8))),
