@@ -29,7 +29,6 @@ def test_the_silicone_has_the_volume_of_its_lengths():
 
 def test_a_cup_goes_on_the_pins_in_one_attitude_only():
     pins = made("forearm-patch").plan.pins
-    assert pins is not None
     turned = {(-x, -y) for x, y in pins.places}
     assert len(turned - set(pins.places)) == 2
     assert min(math.dist(p, q) for p in turned - set(pins.places) for q in pins.places) > pins.hole_radius
@@ -44,7 +43,6 @@ FAULTS = [
     ("C210", "base", "a fin 0.1 too wide", more(box(-15, -12.5, -1.8, 1.8, 0, 2.11))),
     ("C100", "base", "a fin 0.2 low", less(box(-15, -12.5, -2, 2, 1.91, 3))),
     ("C200", "base", "a fin longer than its slot", more(box(-12, -11.4, -1.7, 1.7, 0, 2.11))),
-    ("C300", "base", "a knob on a core", more(moved(cylinder(4.7, 1.0, 1.4), 20, 20))),
     ("C300", "cup2", "a lip in a bore", more(box(-7.2, -6.9, -1, 1, 2.5, 2.8))),
     ("C310", "base", "a core into the cap, which has no hole for it", more(cylinder(3, 0, 2.31))),
     ("C410", "cup2", "a lid with a pinhole", more(cut(box(-38, 38, -30, 30, 4.4, 4.61), [box(0, 0.3, 0, 0.3, 4, 5)]))),

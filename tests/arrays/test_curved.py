@@ -105,6 +105,7 @@ def test_a_wrong_axis_or_an_impossible_order_is_caught():
         (1, neighbours, "pour 2: cast at A1 out against base2"),
         (1, (*parts, *others), "pour 2: cast at A1 out against lid2"),
         (1, (*others, *parts[1:-1]), "mm3 of the silicone stay"),
+        (1, (*others, parts[0], *parts), "pour 2: cast at A1 out"),
         (1, (*others, Removal(CAST, (0, 0, 1))), "pour 2: cast out against base2"),
         (0, first.removals[:-1], "pour 1: cast stays"),
     ):

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import pytest
 
@@ -15,9 +15,8 @@ from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.piece_seams import weep
 from unitcad.checks import mould_checks
 from unitcad.geometry.segments import between_convex, to_segment
-from unitcad.kernels.mesh import bounds, realise
-from unitcad.moulds.cuts import BESIDE, split, straight
-from unitcad.moulds.pieces import base_piece
+from unitcad.kernels.mesh import bounds
+from unitcad.moulds.cuts import BESIDE
 from unitcad.shape import box, cut, moved
 
 TWO = ["layout.rows=2", "layout.columns=2"]
@@ -90,26 +89,6 @@ def test_the_silicone_in_the_seams_is_what_c250_measures(name):
     plate, rim = moulds.spec.moulds.plate_mm, moulds.plan.steps[-1].rim
     heights = (plate, plate + rim) if moulds.construction.own_tails else (sheet.low, rim)
     assert weep(moulds.arranged, tool.seams, (x0, y0, x1, y1), heights) == pytest.approx(found.value, rel=0.03)
-
-
-def plate():
-    drawn = base_piece(box(-60, 60, -50, 50, 0, 5))
-    seams = [straight(-10.0, [(-45, 15), (30, 45)], 0.15), straight(20.0, [(-55, 0), (20, 55)], 0.15, "y")]
-    return split(drawn, seams)
-
-
-def test_where_seams_cross_four_square_corners_meet():
-    """The pieces have the plate's volume but for gap x length x height, the crossing counted once."""
-    play, height = 0.15, 5.0
-    pieces = [realise(piece.shape, 96) for piece in plate().pieces]
-    alone = [split(base_piece(box(-60, 60, -50, 50, 0, 5)), [seam]) for seam in plate().seams]
-    gaps = [120 * 100 * height - sum(realise(p.shape, 96).volume() for p in each.pieces) for each in alone]
-    gap = 120 * 100 * height - sum(piece.volume() for piece in pieces)
-    assert gap == pytest.approx(sum(gaps) - play**2 * height, abs=0.05)
-    assert plate().crossings == (pytest.approx((-11.75, 18.25)),)
-    for one, other in combinations(range(4), 2):
-        near = math.sqrt(2) * play if one + other == 3 else play
-        assert pieces[one].min_gap(pieces[other], 1) == pytest.approx(near, abs=3 / 1024)
 
 
 def test_a_corner_broken_off_where_seams_cross_is_caught():

@@ -420,15 +420,6 @@ def test_an_option_that_is_no_number_is_refused(option, tmp_path, capsys, monkey
     check_words_are_refused(["material", "none.csv", option, "nan"], option, tmp_path, capsys, monkeypatch)
 
 
-@pytest.mark.parametrize("at", [0.1, 0.15, 0.25, 0.5, 1.0])
-def test_a_secant_of_neo_hookes_law_is_exact(at):
-    """E (1 + 1/L + 1/L^2) / 3 with L the stretch: (L - 1/L^2) / (L - 1) = (L^2 + L + 1) / L^2."""
-    strain = np.linspace(0.001, 3.5, 3500)
-    stretch = 1 + at
-    exact = YOUNG * (1 + 1 / stretch + 1 / stretch**2) / 3
-    assert secant(strain, neo_hooke(strain), at) == pytest.approx(exact, rel=1e-4)
-
-
 @pytest.mark.parametrize("slack", [0.0, 0.03, -0.02])
 def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack):
     strain = np.linspace(0.04, 0.6, 60)
