@@ -5,7 +5,6 @@ import math
 from itertools import combinations
 
 import msgspec
-import numpy as np
 import pytest
 
 import unitcad
@@ -14,7 +13,6 @@ from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.sheet import rounded
-from unitcad.arrays.tails import tails
 from unitcad.validation import compound_kind, default_template, load, templates
 
 
@@ -116,16 +114,6 @@ def test_corners_that_meet_are_drawn(columns, rows):
     area = (x1 - x0) * (y1 - y0) - (4 - math.pi) * radius**2
     assert rounded(array.sheet.outline, radius).area == pytest.approx(area)
     assert rounded(array.sheet.outline, radius, 1.0).area > area
-
-
-def test_tails_keep_clear_of_units_and_each_other():
-    array = load_array("forearm-pockets")
-    drawn = [(i, tail) for i, p in enumerate(array.places) for tail in tails(p, p.angle_deg)]
-    for owner, tail in drawn:
-        steps = np.linspace(tail.start, tail.end, 201)
-        for i, place in enumerate(array.places):
-            if i != owner:
-                assert np.hypot(*(steps - (place.x, place.y)).T).min() > place.radius + tail.half
 
 
 def test_a_place_may_hold_another_unit_in_pockets():

@@ -1,9 +1,7 @@
 """Tools larger than the bed: cut between features, joined by dovetails with the play square to the flank, judged."""
 
-import math
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 
 import pytest
 
@@ -11,8 +9,7 @@ from tests.arrays.made_arrays import made
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import mould_checks
-from unitcad.errors import Refusal
-from unitcad.moulds.cuts import LARGE, Feature, Sized, in_gaps, seams, split, straight
+from unitcad.moulds.cuts import split, straight
 from unitcad.pipeline.plan import file_stem
 from unitcad.shape import Common, box, cut, moved, union
 
@@ -82,32 +79,6 @@ def test_too_many_seams_weep_too_much():
     faulty = replace(plan, splits=(*plan.splits[:-1], many))
     found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if "silicone" in f.where]
     assert [f.ok for f in found] == [True, False]
-
-
-def cut_at(bed, other=()):
-    """Cut a tool 220 mm long, a feature 12 mm wide every 20 mm."""
-    features = tuple(
-        Feature(((x - 6.0, -30), (x + 6.0, -30), (x + 6.0, 30), (x - 6.0, 30))) for x in range(-100, 101, 20)
-    )
-    sized = Sized("x", (-110, 110), bed, (-30, 30), features, (tuple(in_gaps((-110, 110), features)),))
-    return [seam.at for seam in seams([sized], "it", 0.15, other)]
-
-
-def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least():
-    assert cut_at(250) == []
-    for bed in (230, 120, 80, 50, 35):
-        where = cut_at(bed)
-        assert all(abs((x - 10) % 20) < 1e-9 for x in where)
-        ends = [-110 + LARGE.depth / 2, *where, 110 - LARGE.depth / 2]
-        assert max(b - a + LARGE.depth for a, b in pairwise(ends)) <= bed
-        assert len(where) >= math.ceil(220 / bed) - 1
-    assert cut_at(150, [straight(-10.0, [(-30, 30)], 0.15)]) == [10.0]
-    with pytest.raises(Refusal) as refused:
-        cut_at(20)
-    assert isinstance(refused.value.nearest, float)
-    assert cut_at(refused.value.nearest)
-    with pytest.raises(Refusal):
-        cut_at(refused.value.nearest - 0.2)
 
 
 def test_the_procedure_joins_and_seals_before_the_first_pour():

@@ -402,7 +402,10 @@ def sensor(quantity, unit, more="", table="sensor"):
 
 
 VELOCITY, VOLTS = sensor("velocity", "mm/s"), sensor("velocity", "mm/s", 'scale = 50.0\nper = "V"\n')
+OMEGA = 2 * np.pi * 125.3
+TWO_SENSORS = sensor("velocity", "mm/s", "scale = 50.0\n") + sensor("displacement", "um", table="motor_sensor")
 MOTION = [
+    (TWO_SENSORS, ("nm", 1e6 / OMEGA), ("V", 1 / 50)),
     (VELOCITY, ("mm/s", 1.0), ("um/s", 1000.0)),
     (sensor("acceleration", "m/s2"), ("g", 1 / 9.80665), ("m/s^2", 1.0)),
     (sensor("displacement", "um"), ("mm", 0.001), ("µm", 1.0)),
@@ -417,9 +420,6 @@ MOTION = [
 def test_units_that_a_file_states_are_converted(tmp_path, table, motor, edge, paired):
     result = measured(tmp_path, table, motor, edge, paired)
     assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)
-
-
-OMEGA = 2 * np.pi * 125.3
 
 
 @pytest.mark.parametrize(
@@ -452,10 +452,3 @@ def test_a_motion_is_a_displacement_over_j_omega(tmp_path, table, motor, um):
 def test_units_that_nobody_can_convert_are_refused(tmp_path, table, motor, edge, field, words, paired):
     with refuses(field, *words):
         measured(tmp_path, table, (motor, 1.0), (edge, 1.0), paired)
-
-
-def test_two_sensors_may_have_two_units(tmp_path):
-    tables = sensor("velocity", "mm/s", "scale = 50.0\n") + sensor("displacement", "um", table="motor_sensor")
-    size = 1e3 / OMEGA  # um of 1 mm/s
-    result = measured(tmp_path, tables, ("nm", 1e3 * size), ("V", 1 / 50), paired=False)
-    assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)

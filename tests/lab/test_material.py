@@ -1,6 +1,5 @@
 """`unitcad material`: layouts and units, methods on exact curves, the table of a spec, refusals, dynamic tests."""
 
-import csv
 import json
 import math
 import os
@@ -459,16 +458,8 @@ def test_every_method_gives_what_another_program_gave(method, results):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_reader_finds_the_engineering_columns(name, results):
-    with open(FILES[name], encoding="utf-8-sig", newline="") as file:
-        rows = [row for row in csv.reader(file, delimiter=";") if row[0][:1].isdigit()]
-    strain, stress = (np.array([float(row[i]) for row in rows]) for i in (3, 4))
+def test_the_header_s_specimen_and_the_pull_s_rate_are_read(name, results):
     curve = results[name].curves[0]
-    np.testing.assert_allclose(
-        np.interp([0.15, 0.5, 3], curve.strain, curve.stress),
-        1e6 * np.interp([0.15, 0.5, 3], strain, stress),
-        rtol=1e-9,
-    )
     assert curve.specimen == Specimen(6, 3, 33, pytest.approx(18), 1000, True)
     assert curve.rate == pytest.approx(450 / 60 / 33, rel=0.01)
 
