@@ -1,10 +1,9 @@
 """Suites' results: promises, frontier, page, plots, timing; and the command's exit codes."""
 
+import gc
 import json
 import math
 import re
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,7 @@ from benchmarks.accuracy.result import (
     shown,
 )
 from unitcad.accuracy.measurements import PROCESSOR, interleaved, timing
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import UnitcadError
 
 RESULT = Result(
     "stability",
@@ -39,6 +38,7 @@ RESULT = Result(
     {"cores": 2},
     "--specs 9",
 )
+STORED = runner.read(Path(__file__).parents[2] / "docs" / "evidence")
 
 
 def test_a_promise_is_kept_up_to_its_limit_and_never_by_nan():
@@ -91,21 +91,20 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path):
 
 
 def test_the_stored_results_are_read_and_a_cell_of_another_type_is_not_written(tmp_path):
-    assert len(runner.read(Path(__file__).parents[2] / "docs" / "evidence")) > 5
+    assert len(STORED) > 5
     with pytest.raises(TypeError, match="Table t"):
         replace(RESULT, tables=(Table("t", ("a",), ((True,),)),)).as_dict()
 
 
 def test_the_front_page_is_one_screen_with_a_line_for_every_suite():
-    stored = runner.read(Path(__file__).parents[2] / "docs" / "evidence")
-    text = front(stored)
-    assert text.count("](accuracy/") == len(stored)
+    text = front(STORED)
+    assert text.count("](accuracy/") == len(STORED)
     assert len(text.split()) < 500
-    assert all(f"[{question(result)}](accuracy/{result.suite}.md) | {answer(result)}" in text for result in stored)
+    assert all(f"[{question(result)}](accuracy/{result.suite}.md) | {answer(result)}" in text for result in STORED)
 
 
 def test_a_page_shows_question_answer_plot_and_table_and_folds_the_rest():
-    for result in runner.read(Path(__file__).parents[2] / "docs" / "evidence"):
+    for result in STORED:
         names = [f"{i}.svg" for i in range(len(result.plots))]
         text = markdown(result, names)
         shown_part, _, folded = text.partition('<details markdown="1">')
@@ -121,8 +120,7 @@ def test_a_page_shows_question_answer_plot_and_table_and_folds_the_rest():
 
 def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     """The Hankel line once said 0.20 of a bound where its page had 0.306."""
-    results = {result.suite: result for result in runner.read(Path(__file__).parents[2] / "docs" / "evidence")}
-    hankel = results["hankel"]
+    (hankel,) = (result for result in STORED if result.suite == "hankel")
     over = [
         float(row[table.columns.index("over its bound")])
         for table in hankel.tables
@@ -141,26 +139,27 @@ def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     assert float(said[1]) == pytest.approx(max(over), abs=0.006)
 
 
-def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("suite", "options", "named"),
+    [
+        ("stability", {"specs": 10}, "'extremes'"),
+        ("hankel", {"media": 600}, "'stability'"),
+        ("stability", {"seed": 7}, "--media"),
+        ("stability", {"quick": True, "media": 600}, "--quick"),
+        ("extremes", {"quick": True, "specs": 10}, "--quick"),
+        ("Left_Out", {"quick": True}, "closest: left-out; nearest accepted: 'left-out'"),
+        ("stability", {"quick": True, "out": "file"}, "no folder that can be written"),
+        ("stability", {"quick": True, "out": "damaged"}, "not a result"),
+    ],
+)
+def test_a_bad_option_or_folder_is_refused_before_the_work(suite, options, named, tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "run", lambda *_: pytest.fail("worked"))
     (tmp_path / "file").touch()
     (tmp_path / "damaged").mkdir()
     (tmp_path / "damaged" / "accuracy.json").write_text("{")
-    with pytest.raises(Refusal, match="'extremes'"):
-        accuracy(["stability"], quick=False, specs=10, out=None, as_json=False)
-    with pytest.raises(Refusal, match="'stability'"):
-        accuracy(["hankel"], media=600)
-    with pytest.raises(Refusal, match="--media"):
-        accuracy(["stability"], seed=7)
-    with pytest.raises(Refusal, match="--quick"):
-        accuracy(["stability"], quick=True, media=600)
-    with pytest.raises(Refusal, match="--quick"):
-        accuracy(["extremes"], quick=True, specs=10, out=None, as_json=False)
-    with pytest.raises(Refusal, match=r"closest: left-out; nearest accepted: 'left-out'"):
-        accuracy(["Left_Out"], quick=True, specs=None, out=None, as_json=False)
-    for place, message in (("file", "no folder that can be written"), ("damaged", "not a result")):
-        with pytest.raises(UnitcadError, match=message):
-            accuracy(["stability"], quick=True, specs=None, out=tmp_path / place, as_json=False)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UnitcadError, match=named):
+        accuracy([suite], **{name: Path(value) if name == "out" else value for name, value in options.items()})
 
 
 def test_plots_repeat_and_leave_out_what_has_no_logarithm():
@@ -169,7 +168,8 @@ def test_plots_repeat_and_leave_out_what_has_no_logarithm():
     assert "&lt;b&gt;" in svg(Plot("<b>", "", "", {}))
 
 
-def test_timing_is_interleaved_and_shows_its_spread():
+def test_timing_is_interleaved_and_shows_its_spread(monkeypatch):
+    monkeypatch.setattr(gc, "collect", lambda: None)
     order = []
     times = interleaved({"a": lambda: order.append("a"), "b": lambda: (order.append("b"), time.sleep(0.002))}, 3)
     assert order == ["a", "b"] * 4
@@ -188,16 +188,6 @@ def test_the_command_fails_on_a_broken_promise_alone(tmp_path, monkeypatch, caps
     printed = capsys.readouterr()
     assert json.loads(printed.out)["suites"][0]["promises"][1]["value"] is None
     assert "broken: nan, promised 1" in printed.err
-
-
-@pytest.mark.long
-def test_stability_by_the_command_line():
-    """CI runs all suites by the command line after the tests."""
-    command = [sys.executable, "-m", "benchmarks.accuracy", "stability", "--quick", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
-    (suite,) = json.loads(done.stdout)["suites"]
-    assert all(promise["ok"] for promise in suite["promises"])
 
 
 def test_curves_have_no_points_and_a_linear_axis_shows_zero():

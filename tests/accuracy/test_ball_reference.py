@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.ball_reference import Kernel, TooHard, response
+from benchmarks.accuracy.ball_reference import response
 from unitcad.accuracy.random_media import CLASSES, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered import KelvinVoigt, LossFactor, UniformDisc
 
 pytest.importorskip("flint")
 
@@ -39,34 +39,6 @@ def _off(medium, load, omega, r, z, tolerances):
 
 def _not_sideways(one):
     return replace(one, load=replace(one.load, direction="radial")) if one.load.direction == "tangential" else one
-
-
-def test_the_reference_gives_boussinesqs_disc_and_point():
-    """At rest, centre 2 (1 - nu^2) a / E; 2 mm under a newton 4 pi mu R u_z = 2 (1 - nu) + z^2 / R^2."""
-    body, r, z = LayeredMedium([], HalfSpace(1000, 3e4, 0.3)), np.array([1e-12, 3.5e-3, 2e-2]), 2e-3
-    disc = response(body, DISC, 0.0, r).u[1]
-    assert disc[0] == pytest.approx(2 * (1 - 0.3**2) * 3.5e-3 / 3e4, rel=1e-9)
-    assert disc[1] == pytest.approx(4 * (1 - 0.3**2) * 3.5e-3 / (np.pi * 3e4), rel=1e-9)
-    far = np.hypot(r, z)
-    point = response(body, Point(), 0.0, r, z).u[1]
-    exact = (2 * 0.7 + z**2 / far**2) / (4 * np.pi * (3e4 / 2.6) * far)
-    assert np.max(np.abs(point - exact)) < 1e-9 * exact[0]
-
-
-@pytest.mark.parametrize("z", [0.0, 2e-3, 31e-3])
-@pytest.mark.parametrize("k", [20.0, 300.0 + 15j, 2000.0])
-@pytest.mark.parametrize("base", [BONE, HalfSpace(1000, 0.0, 0.3)], ids=["bone", "free"])
-def test_its_kernel_is_the_compliance(k, z, base):
-    medium = LayeredMedium(FOREARM, base)
-    if not base.youngs_modulus:
-        z = min(z, 30.5e-3)
-    at = np.array([k], dtype=complex)
-    for column, direction in enumerate(("tangential", "normal")):
-        theirs = Kernel(medium, 785.0, z, Point(direction))(np.array([k]))[0]
-        own = k * medium.transfer([column], at, 785.0, z)[:, 0, 0]
-        if column == 0:
-            own = np.insert(own, 1, k * medium.shear_transfer(at, 785.0, z))
-        assert np.max(np.abs(own - theirs)) < 1e-12 * np.max(np.abs(theirs)) + 1e-30
 
 
 @pytest.mark.parametrize(("medium", "hertz"), [(GEL, 250), (NEARLY_FLUID, 50)], ids=["gel", "nearly fluid"])
@@ -126,29 +98,4 @@ SLOW = ("partly damped", "undamped")
 @pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.long if one in SLOW else ()) for one in CLASSES])
 def test_errors_hold_on_random_media(kind):
     one = trial(kind, 1)
-    assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-3, 1e-5, 1e-7, 1e-9))) <= 1
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", CLASSES)
-@pytest.mark.parametrize("seed", range(100, 190))
-def test_errors_hold_on_many_random_media(kind, seed):
-    one = trial(kind, seed)
-    try:
-        assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-3, 1e-5, 1e-7, 1e-9))) <= 1
-    except TooHard as reason:
-        pytest.skip(f"too hard for the reference: {reason}")
-
-
-def test_the_response_without_damping_is_bounded_where_its_limit_converges_slowly():
-    """A polynomial through six small losses was off by 1.9 times the stated error at rtol 0.1.
-
-    The solver at 1e-5 stands in for the reference, with which it agreed to 3e-6; that takes half a minute.
-    """
-    one = _not_sideways(trial("wide contrast", 144))
-    fine = one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=1e-5)
-    for rtol in (0.1, 1e-2, 1e-3):
-        coarse = one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol)
-        for name in ("r", "z"):
-            wrong = np.abs(getattr(coarse, f"u_{name}") - getattr(fine, f"u_{name}"))
-            assert np.all(wrong <= getattr(coarse, f"error_{name}") + getattr(fine, f"error_{name}"))
+    assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-5, 1e-9))) <= 1

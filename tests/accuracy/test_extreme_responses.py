@@ -1,14 +1,11 @@
 """Extreme media against the reference in ball arithmetic, and what the page promises of them."""
 
-import math
-from dataclasses import asdict
-
 import numpy as np
 import pytest
 
 from benchmarks.accuracy import extreme_responses
 from benchmarks.accuracy.ball_reference import TooHard
-from benchmarks.accuracy.extreme_responses import Row, cases, promises, rows, survey
+from benchmarks.accuracy.extreme_responses import Row, cases, promises, rows
 from benchmarks.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
@@ -56,25 +53,6 @@ def test_the_media_have_every_class_and_load_the_same_from_their_seed():
             again.z,
         )
         assert np.array_equal(one.r, again.r)
-
-
-def test_an_interrupted_survey_resumes_and_another_seed_has_other_media(tmp_path, monkeypatch):
-    """Four media, stopped after two: two are computed, and the rows are those of one run."""
-    computed = []
-
-    def quick(job):
-        computed.append(job)
-        return [asdict(Row(f"{job[0]} {job[1]}", job[0], 0.1, 0.0, 0.1, math.inf, 0.0, 9))]
-
-    monkeypatch.setattr(extreme_responses, "_medium", quick)
-    journal = tmp_path / "out" / "media.jsonl"
-    going = survey(4, 3, journal)
-    first = [next(going), next(going)]
-    del going
-    assert list(survey(4, 3, journal))[:2] == first
-    assert computed == [(kind, 30_000) for kind in CLASSES[:4]]
-    list(survey(4, 4, journal))
-    assert len(computed) == 8
 
 
 def test_no_value_breaks_the_bound_and_no_reference_decides_nothing(monkeypatch):

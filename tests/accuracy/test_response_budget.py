@@ -29,20 +29,15 @@ def test_a_smaller_rtol_does_not_make_it_worse(film):
     assert errors[1e-12] < 1.5 * errors[1e-8]
 
 
-def test_the_estimates_cover_what_the_tolerances_differ_by(film):
-    best = film[1e-12]
-    for rtol in (1e-6, 1e-8):
-        gap = max(np.max(np.abs(film[rtol].u_z - best.u_z)), np.max(np.abs(film[rtol].u_r - best.u_r)))
-        assert gap <= film[rtol].error + best.error
-
-
 def test_panels_are_not_wasted(film):
     for found in film.values():
         assert found.wavenumbers < 3 * 1.1 * 40_000 * 16
 
 
-@pytest.mark.parametrize("modulus", [pytest.param(1e3, marks=pytest.mark.long), 1e5, 1e7])
-@pytest.mark.parametrize("load", [Point(), UniformDisc(3e-3, "radial"), Point("radial"), UniformDisc(3e-3)])
+@pytest.mark.parametrize(
+    ("load", "modulus"),
+    [(Point(), 1e7), (Point("radial"), 1e5), (UniformDisc(3e-3, "radial"), 1e5), (UniformDisc(3e-3), 1e7)],
+)
 def test_a_tighter_rtol_never_loosens_the_bound(load, modulus):
     """A film of 1 micrometre under a point: 2.2e-5 at rtol 1e-5 used to become 2.7e-4 at 1e-9."""
     film = Layer(1e-6, 1000, modulus, 0.45, LossFactor(0.2))

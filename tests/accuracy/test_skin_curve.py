@@ -21,8 +21,8 @@ def test_units_on_skin_lie_within_the_contact_s_factors(drive, stuck):
     variant = estimate_input(load("embedded", ["layers.0.material=dragon-skin-10-medium"]))
     mm = np.array([5.0, 10.0, 20.0, 30.0])
     r = variant.diameter / 2 + 1e-3 * np.array([0.0, *mm])
-    found = suite.unit_decay(variant, drive, stuck, r, 0.7) / suite.decay(variant, r, drive, 125.0)  # type: ignore[arg-type]
-    low, high = contact(drive, mm)  # type: ignore[arg-type]
+    found = suite.unit_decay(variant, drive, stuck, r, 0.7) / suite.decay(variant, r, drive, 125.0)
+    low, high = contact(drive, mm)
     assert np.all(found[1:] > 0.95 * low)
     assert np.all(found[1:] < 1.05 * high)
     if (drive, stuck) == ("flat", "resting"):

@@ -9,7 +9,7 @@ import pytest
 from unitcad.accuracy import survey
 from unitcad.accuracy.survey import in_order
 
-PATIENCE = 0.5
+PATIENCE = 0.3
 
 
 def _job(name):

@@ -1,9 +1,6 @@
 """A sweep over an array file: each variant is an array's result, refused ones are named."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import pytest
 
@@ -26,7 +23,7 @@ base = "pair.toml"
 """
 
 
-def _sweep(folder: Path, text: str = SWEEP) -> Path:
+def _sweep(folder, text=SWEEP):
     (folder / "pair.toml").write_text(ARRAY)
     (folder / "pitches.toml").write_text(text)
     return folder / "pitches.toml"

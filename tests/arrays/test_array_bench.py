@@ -1,7 +1,5 @@
 """The bench rules, pictures, bill and plates of arrays: a unit's tests with the sets of arrays."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest
@@ -13,10 +11,9 @@ from tests.casting.test_bench_views import hues
 from tests.casting.test_plates import lie_apart
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.drawings import ARROW, GREASE
 from unitcad.casting.preparation import printing
-from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure_text import files
 from unitcad.casting.views import BenchPictures, picture_path, views
 from unitcad.designs import layer_colour
@@ -26,7 +23,7 @@ CURVED = ("sleeve-curved", "layout.columns=2", "layout.rows=1")
 ARRAYS = (PATCH, BAND, CURVED)
 
 
-def planned(*source: str) -> tuple[PatchMoulds, Procedure]:
+def planned(*source):
     array = patch_moulds(load_array(source[0], list(source[1:])))
     return array, array_procedure(array, [100.0] * len(array.plan.steps), 1000.0, {})
 

@@ -1,7 +1,5 @@
 """The commands know arrays: init, schema, list, build and report."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json
@@ -9,40 +7,35 @@ import re
 import tomllib
 from pathlib import Path
 
+import jsonschema
 import pytest
-from typer.testing import CliRunner
 
+from tests.in_process import unitcad
 from unitcad.arrays.array_file import array_hash, array_templates, load_array
-from unitcad.cli import app
 from unitcad.errors import Refusal
-
-run = CliRunner()
 
 
 def test_arrays_are_listed():
-    shown = json.loads(run.invoke(app, ["list", "arrays", "--json"]).stdout)["arrays"]
+    shown = json.loads(unitcad("list", "arrays", "--json").stdout)["arrays"]
     assert list(shown) == list(array_templates())
     assert all(about for about in shown.values())
 
 
 @pytest.mark.parametrize("name", array_templates())
-def test_a_new_file_is_the_template_under_its_own_name(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    done = run.invoke(app, ["init", "mine", "--template", name])
-    assert done.exit_code == 0, done.output
-    text = Path("mine.toml").read_text()
+def test_a_new_file_is_the_template_under_its_own_name(name, tmp_path):
+    assert unitcad("init", "mine", "--template", name, cwd=tmp_path).returncode == 0
+    text = (tmp_path / "mine.toml").read_text()
     assert text.startswith("#:schema ./unitcad-array.schema.json")
-    assert {**load_array("mine.toml").asked, "name": name} == {**load_array(name).asked, "name": name}
+    assert {**load_array(tmp_path / "mine.toml").asked, "name": name} == {**load_array(name).asked, "name": name}
     # Every further key that is offered is one: its table is accepted with the comment's sign taken away.
     offered = [line[2:] for line in text.splitlines() if line.startswith("# ") and " = " in line and "..." not in line]
     assert any(line.startswith('printer = "fdm-0.4"') for line in offered)
 
 
 def test_the_schema_has_each_kind_of_layout():
-    schema = json.loads(run.invoke(app, ["schema", "array"]).stdout)
+    schema = json.loads(unitcad("schema", "array").stdout)
     kinds = schema["$defs"]["AskedArray"]["properties"]["layout"]["oneOf"]
     assert {kind["$ref"].rpartition("/")[2] for kind in kinds} == {"GridTable", "HexTable", "RingTable", "ListTable"}
-    jsonschema = pytest.importorskip("jsonschema")
     for path in array_templates().values():
         jsonschema.validate(tomllib.loads(path.read_text()), schema)
 
@@ -60,19 +53,10 @@ def test_a_refusal_names_file_line_and_the_pitch_that_fits(tmp_path):
 
 
 def test_build_writes_an_array_and_its_page(tmp_path):
-    options = [
-        "--formats",
-        "stl",
-        "--set",
-        "layout.columns=1",
-        "--set",
-        "layout.rows=1",
-        "--set",
-        "moulds.cavities=[1,1]",
-    ]
-    options += ["--set", "sheet.strap_slot_mm=[3,8]"]
-    done = run.invoke(app, ["build", "forearm-pockets", "-o", str(tmp_path), "--report", *options])
-    assert done.exit_code == 0, done.output
+    sets = "--set layout.columns=1 --set layout.rows=1 --set moulds.cavities=[1,1] --set sheet.strap_slot_mm=[3,8]"
+    words = f"build forearm-pockets --report --formats stl {sets} -o"
+    done = unitcad(*words.split(), tmp_path)
+    assert done.returncode == 0, done.stderr
     folder = Path(done.stdout.splitlines()[-1])
     page = (folder / "report.html").read_text()
     assert "1 units" not in page
@@ -93,7 +77,8 @@ def test_step_0_of_an_array_measures_each_unit_s_parts_and_its_command_builds_th
         '[layout]\nkind = "grid"\ncolumns = 2\nrows = 1\npitch_mm = 25.0\n'
     )
     given = ["--set", "unit.motor.thickness_mm=2", "--set", "place.0.unit.fpcb.thickness_mm=0.11"]
-    done = run.invoke(app, ["build", str(tmp_path / "mixed.toml"), "-o", str(tmp_path), "--only", "casting", *given])
+    words = "--only", "casting", "-o", tmp_path
+    done = unitcad("build", tmp_path / "mixed.toml", *words, *given)
     assert "assumed: unit.fpcb.thickness_mm = 0.11 (usual stock)" in done.stderr
     folder = Path(done.stdout.splitlines()[-1])
     text = (folder / "casting.md").read_text()
@@ -108,5 +93,5 @@ def test_step_0_of_an_array_measures_each_unit_s_parts_and_its_command_builds_th
     assert len(sets := command.replace("--set ", "").split()) == 8
     assert array_hash(load_array(folder / "array.toml", sets)) == array_hash(load_array(folder / "array.toml"))
     assert "(assumed;" not in (folder / "units/motor-10mm/casting.md").read_text()
-    again = run.invoke(app, ["build", str(folder / "array.toml"), "-o", str(tmp_path), "--only", "casting"])
+    again = unitcad("build", folder / "array.toml", *words)
     assert "assumed: unit.motor.thickness_mm = 2" in again.stderr, "a result's file has every value"

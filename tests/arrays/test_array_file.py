@@ -1,32 +1,26 @@
 """Array files: layouts give their points, what does not fit is refused with a value that does."""
 
-from __future__ import annotations
-
 import gc
 import math
 from itertools import combinations
-from typing import Any
 
 import msgspec
-import numpy as np
 import pytest
 
 import unitcad
-from unitcad.arrays.array import Array
+from tests.refusals import refuses
 from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.sheet import rounded
-from unitcad.arrays.tails import tails
-from unitcad.errors import Refusal
 from unitcad.validation import compound_kind, default_template, load, templates
 
 
-def _array(layout: dict[str, Any], **more: Any) -> Array:
+def _array(layout, **more):
     return load_array({"name": "a", "array": "pockets", "unit": default_template(), "layout": layout, **more})
 
 
-def _nearest(array: Array) -> list[float]:
+def _nearest(array):
     at = [(p.x, p.y) for p in array.places]
     return [min(math.dist(p, q) for q in at if q != p) for p in at]
 
@@ -38,7 +32,6 @@ def test_a_template_settles_to_data_that_give_the_same_array(name):
     assert load_array(msgspec.json.decode(msgspec.json.encode(array.asked))) == array
     for source in (name, array_templates()[name]):
         kind = compound_kind(source)
-        assert kind is not None
         assert kind.name == "array"
     assert compound_kind(default_template()) is None
 
@@ -79,17 +72,13 @@ def test_listed_points_keep_their_distances():
 
 _GRID = {"kind": "grid", "columns": 3, "rows": 3, "pitch_mm": 20}
 REFUSED = [
-    ({"layout": {**_GRID, "pitch_mm": 12}}, "layout.pitch_mm", 18),
     ({"layout": {**_GRID, "pitch_mm": [20, 12]}}, "layout.pitch_mm.1", 16),
-    ({"layout": {**_GRID, "pitch_mm": -3}}, "layout.pitch_mm", 18),
-    ({"layout": {"kind": "hex", "pitch_mm": 10}}, "layout.pitch_mm", 18),
     ({"layout": {"kind": "ring", "count": 30}, "limb": {"radius_mm": 40}}, "layout.count", 13),
     ({"layout": {"kind": "ring", "count": 4}}, "limb.radius_mm", 40),
     ({"layout": {"kind": "ring", "count": 4, "bands": 2}, "limb": {"radius_mm": 40}}, "layout.band_pitch_mm", 40),
     ({"layout": {"kind": "list", "points_mm": [[0, 0], [10, 0]]}}, "layout.points_mm.1", [16, 0]),
     ({"layout": {"kind": "list", "points_mm": [[3, 3], [3, 3]]}}, "layout.points_mm.1", [19, 3]),
     ({"layout": {"kind": "grd"}}, "layout.kind", "grid"),
-    ({"layout": {**_GRID, "rings": 2}}, "layout.rings", None),
     ({"place": [{"at": [4, 1]}]}, "place.0.at", [3, 1]),
     ({"place": [{"at": "B4"}]}, "place.0.at", None),
     ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", 27),
@@ -111,9 +100,9 @@ REFUSED = [
 
 @pytest.mark.parametrize(("change", "field", "nearest"), REFUSED, ids=lambda value: str(value)[:40])
 def test_what_does_not_fit_is_refused_with_what_does(change, field, nearest):
-    with pytest.raises(Refusal) as refused:
+    with refuses(field) as refused:
         _array(**{"layout": _GRID, **change})
-    assert (refused.value.field, refused.value.nearest) == (field, nearest)
+    assert refused.value.nearest == nearest
 
 
 @pytest.mark.parametrize("rows", [1, 2])
@@ -125,16 +114,6 @@ def test_corners_that_meet_are_drawn(columns, rows):
     area = (x1 - x0) * (y1 - y0) - (4 - math.pi) * radius**2
     assert rounded(array.sheet.outline, radius).area == pytest.approx(area)
     assert rounded(array.sheet.outline, radius, 1.0).area > area
-
-
-def test_tails_keep_clear_of_units_and_each_other():
-    array = load_array("forearm-pockets")
-    drawn = [(i, tail) for i, p in enumerate(array.places) for tail in tails(p, p.angle_deg)]
-    for owner, tail in drawn:
-        steps = np.linspace(tail.start, tail.end, 201)
-        for i, place in enumerate(array.places):
-            if i != owner:
-                assert np.hypot(*(steps - (place.x, place.y)).T).min() > place.radius + tail.half
 
 
 def test_a_place_may_hold_another_unit_in_pockets():
@@ -168,9 +147,7 @@ def test_no_table_lets_the_decoder_read_beyond_its_memory():
         gc.collect()
 
 
-def test_python_takes_changes_as_a_dict_and_load_refuses_arrays():
-    array = load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
-    assert array.places[1].x - array.places[0].x == 25
-    for source in ("forearm-pockets", {"array": "pockets"}):
-        with pytest.raises(unitcad.UnitcadError, match="an array of units"):
-            unitcad.load(source)
+@pytest.mark.parametrize("source", ["forearm-pockets", {"array": "pockets"}])
+def test_load_refuses_arrays(source):
+    with pytest.raises(unitcad.UnitcadError, match="an array of units"):
+        load(source)

@@ -1,9 +1,5 @@
 """The unit of an array changed by paths: what `like` names, and values in it."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from unitcad.arrays.array_file import load_array
@@ -23,7 +19,7 @@ diameter_mm = 15
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path):
     path = tmp_path / "pair.toml"
     path.write_text(LIKE)
     return path

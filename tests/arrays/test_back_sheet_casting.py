@@ -1,7 +1,5 @@
 """The procedure of a back sheet: its order, its amounts and its words."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import asdict
 from itertools import pairwise
@@ -12,13 +10,12 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.drawings import HELD, TAPE_WIDTH, tape_places
-from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import pour_warnings
 from unitcad.shape.lettering import seen
 
 
 @pytest.fixture(scope="module")
-def made() -> Procedure:
+def made():
     moulds = patch_moulds(load_array("forearm-patch"))
     return array_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0, {})
 
@@ -97,8 +94,8 @@ def test_each_piece_of_a_long_tool_is_held_down():
 
 
 def test_a_pour_that_outlasts_its_pot_life_is_warned_of():
-    """144 cavities take half a minute each; nine do not."""
-    large = load_array("forearm-patch", ["layout.columns=12", "layout.rows=12"])
+    """56 cavities take half a minute each; nine do not."""
+    large = load_array("forearm-patch", ["layout.columns=8", "layout.rows=7"])
     for array, late in ((large, True), (load_array("forearm-patch"), False)):
         moulds = patch_moulds(array)
         pours = array_procedure(moulds, [100.0] * 2, 1000.0, {}).pours

@@ -1,7 +1,5 @@
 """An array's page in Chromium: the 3D view of a unit's page, with patch and tools."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from chromium import Visit
@@ -67,7 +65,7 @@ def test_a_unit_that_runs_code_has_no_3d_view(folder, tmp_path):
     assert 'design = "encapsulating"' in text
     code = 'design = "mine.py:mine"\ndesign_source = "raise SystemExit(7)"'
     (copy / "array.toml").write_text(text.replace('design = "encapsulating"', code))
-    warnings: list[str] = []
+    warnings = []
     page = write_report(copy, warnings.append).read_text()
     assert [line for line in warnings if "no 3D view" in line]
     assert "<script" not in page

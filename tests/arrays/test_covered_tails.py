@@ -1,7 +1,5 @@
 """Tails that end under the sheet: found, told how far before its edge, and what to do."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -58,7 +56,7 @@ def test_a_tail_longer_by_so_much_has_its_end_out_of_the_sheet(name):
         half = tail_half_width(place.unit)
         end = place.radius + tail_length(place.unit) + tail.short_mm
 
-        def meets(at: float, place=place, half=half) -> bool:
+        def meets(at, place=place, half=half):
             slice_ = moved(rotated(box(at, at + 0.01, -half, half, -1, 1), "z", place.angle_deg), place.x, place.y)
             return (realise(slice_, 256) ^ plan).volume() > 1e-9
 

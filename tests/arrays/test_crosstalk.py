@@ -9,7 +9,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit import outline
 from unitcad.arrays.crosstalk import (
@@ -31,11 +30,11 @@ from unitcad.estimate_inputs import estimate_input, estimate_spec
 UNIT = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
 
 
-def array(layout: dict, **tables: object) -> Array:
+def array(layout, **tables):
     return load_array({"name": "test", "array": "pockets", "unit": UNIT, "layout": layout, **tables})
 
 
-def grid(columns: int, rows: int, pitch: float, **tables: object) -> Array:
+def grid(columns, rows, pitch, **tables):
     return array({"kind": "grid", "columns": columns, "rows": rows, "pitch_mm": pitch}, **tables)
 
 
@@ -43,20 +42,21 @@ NINE = grid(3, 3, 20.0)
 DATA = crosstalk(NINE, masses=True)
 
 
-def _scattered(seed: int, count: int, other: str = "") -> Array:
-    rng, points = np.random.default_rng(seed), []
-    while len(points) < count:
-        at = rng.uniform(0, 26 * math.sqrt(count), 2).tolist()
+def scattered():
+    """Five units at random, two of them of other kinds."""
+    rng, points = np.random.default_rng(2), []
+    while len(points) < 5:
+        at = rng.uniform(0, 60, 2).tolist()
         if all(math.dist(at, known) > 19.0 for known in points):
             points.append(at)
-    place = [{"at": f"P{i + 1}", "unit": {"like": other, "fpcb": {"tail_length_mm": 1.0}}} for i in (1, 4)]
-    return array({"kind": "list", "points_mm": points}, place=place if other else [], sheet={"thickness_mm": 1.5})
+    others = {"P2": "motor-10mm", "P5": "single-embedded"}
+    place = [{"at": at, "unit": {**UNIT, "like": like}} for at, like in others.items()]
+    return array({"kind": "list", "points_mm": points}, place=place, sheet={"thickness_mm": 1.5})
 
 
-@pytest.mark.parametrize(("seed", "other"), [(1, ""), (2, "motor-10mm"), (3, "single-embedded")])
-def test_every_pair_is_what_the_solver_gives_it_alone(seed, other):
+def test_every_pair_is_what_the_solver_gives_it_alone():
     """The motion as a vector: two forces in quadrature along x and y, each component in Cartesian axes."""
-    made = _scattered(seed, 7, other)
+    made = scattered()
     data = crosstalk(made, band=())
     for i, one in enumerate(made.places):
         variant = estimate_input(one.unit)
@@ -163,13 +163,6 @@ def test_more_units_than_their_masses_can_be_worked_out_for_are_refused():
         crosstalk(grid(11, 10, 20.0), band=(), masses=True)
 
 
-def test_units_on_two_bodies_or_without_an_estimate_are_refused():
-    place = [{"at": "A2", "unit": {**UNIT, "estimate": {"tissue": "gel-50kpa"}}}]
-    with pytest.raises(Refusal) as refused:
-        crosstalk(grid(2, 1, 20.0, place=place))
-    assert refused.value.field == "estimate.tissue"
-
-
 def test_a_single_unit_has_no_neighbour():
     single = grid(1, 1, 20.0)
     data = crosstalk(single)
@@ -208,9 +201,7 @@ def test_the_heat_map_shows_every_pair_and_the_map_every_unit():
     assert "<title>circuit</title>" in patch
 
 
-def test_eight_units_round_a_limb_get_alike_and_the_middle_of_a_grid_gets_the_most():
+def test_eight_units_round_a_limb_get_alike():
     """Symmetry: what differs is what the centres are rounded to."""
-    assert "With all other units on, all get alike: 0.22" in " ".join(
-        crosstalk_lines(crosstalk(load_array("wrist-band")))
-    )
-    assert "B2 gets the most" in " ".join(crosstalk_lines(crosstalk(load_array("forearm-patch"))))
+    said = " ".join(crosstalk_lines(crosstalk(load_array("wrist-band"))))
+    assert "With all other units on, all get alike: 0.22" in said

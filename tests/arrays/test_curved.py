@@ -1,20 +1,17 @@
 """Back sheets cast round the limb: every mould check holds on their tools, and a fault drawn into one is caught."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial
 
 import pytest
 
-from tests.arrays.made_arrays import Change, less, made, more, notch, refusal_of, with_tool
+from tests.arrays.made_arrays import less, made, more, notch, refusal_of, with_tool
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
-from unitcad.casting.procedure import Procedure
 from unitcad.checks import mould_checks
 from unitcad.moulds.pieces import CAST, Removal
-from unitcad.shape import Shape, box, cut, cylinder, moved, rotated
+from unitcad.shape import box, cut, cylinder, moved, rotated
 
 R = 40.0
 
@@ -33,7 +30,7 @@ def test_the_silicone_has_the_volume_of_its_lengths():
     assert back == pytest.approx(math.hypot(R + 4.61, 5.75), abs=1 / 1024)
     turn = 60 / (R + (sheet.low + sheet.high) / 2)
 
-    def area(radius: float) -> float:
+    def area(radius):
         """Of a cylinder's part of the sheet: each corner keeps a quarter disc, seen square to the sheet's end."""
         n, lost = 2000, 0.0
         for i in range(n):
@@ -43,7 +40,7 @@ def test_the_silicone_has_the_volume_of_its_lengths():
 
     barrel = sum(area(low + 1.25 * (i + 0.5) / 50) for i in range(50)) * 1.25 / 50
 
-    def under(inner: float, outer: float, top: float) -> float:
+    def under(inner, outer, top):
         """Between a unit's foot and the sheet: from `top` up, or from the skin where that is 0."""
         n, total = 400, 0.0
         for i in range(n):
@@ -72,20 +69,16 @@ def test_each_unit_stands_where_its_arc_is():
         assert (math.hypot(x, z), y) == (pytest.approx(R + 1.0, abs=2e-3), pytest.approx(place.y, abs=1e-9))
 
 
-def at(shape: Shape, degrees: float) -> Shape:
+def at(shape, degrees):
     """What is drawn about the z axis, the skin at z = 0, turned about the limb's axis."""
     return moved(rotated(moved(shape, z=R), "y", degrees), z=-R)
 
 
 SLANT = math.degrees(10 / (R + 4.3545))
-PINS = pair().plan.steps[-1].pins
-assert PINS is not None
-PIN, SEAT = PINS.places[0], PINS.seat
-FAULTS: list[tuple[str, str, str, Change]] = [
+SEAT = pair().plan.steps[-1].pins.seat
+FAULTS = [
     ("C100", "lid2", "a seam across the land", less(box(-0.2, 0.2, 5, 40, 4.5, 5.5))),
-    ("C100", "base2", "a moat 0.1 too deep", less(at(cylinder(7, -0.1, 1), SLANT))),
     ("C200", "base2", "a core 0.05 too high", more(at(cylinder(4, 0, 2.16), SLANT))),
-    ("C210", "base2", "a pin 0.1 too thick", more(moved(cylinder(2.1, SEAT, SEAT + 2), *PIN))),
     ("C220", "lid2", "holes for the pins too wide", less(box(-99, 99, -99, 99, SEAT - 1, SEAT + 3))),
     ("C300", "base2", "a knob on a slanted core", more(at(cylinder(4.7, 1.0, 1.4), SLANT))),
     ("C400", "lid2", "the vents of an end that are shut", more(box(-4, 4, 8, 11, 5.1, 8))),
@@ -112,6 +105,7 @@ def test_a_wrong_axis_or_an_impossible_order_is_caught():
         (1, neighbours, "pour 2: cast at A1 out against base2"),
         (1, (*parts, *others), "pour 2: cast at A1 out against lid2"),
         (1, (*others, *parts[1:-1]), "mm3 of the silicone stay"),
+        (1, (*others, parts[0], *parts), "pour 2: cast at A1 out"),
         (1, (*others, Removal(CAST, (0, 0, 1))), "pour 2: cast out against base2"),
         (0, first.removals[:-1], "pour 1: cast stays"),
     ):
@@ -130,7 +124,7 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap():
 
 
 @pytest.fixture(scope="module")
-def procedure() -> Procedure:
+def procedure():
     moulds = sleeve()
     return array_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0, {})
 

@@ -14,7 +14,7 @@ from unitcad.errors import Refusal
 NINE, WIDE = "forearm-pockets", "--set=layout.pitch_mm=28"
 
 
-def run(*words: str) -> tuple[int, str, str]:
+def run(*words):
     found = CliRunner().invoke(app, ["estimate", *words], env={"COLUMNS": "200"})
     return found.exit_code, found.stdout, found.stderr
 
@@ -35,7 +35,7 @@ def test_the_answer_comes_first_and_the_tables_behind_details():
     assert "change the sum at B2 by x 1.0" in more
 
 
-def test_json_is_the_data_and_several_are_compared_with_the_first(tmp_path):  # type: ignore[no-untyped-def]
+def test_json_is_the_data_and_several_are_compared_with_the_first(tmp_path):
     code, out, _ = run(NINE, "--json")
     assert code == 0
     assert json.loads(out) == json.loads(json.dumps(crosstalk(load_array(NINE))))

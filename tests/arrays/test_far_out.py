@@ -1,12 +1,9 @@
 """Values far outside the usual ranges: each array is made, or refused with a field and in seconds."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import random
 import time
-from typing import Any
 
 import pytest
 
@@ -24,7 +21,7 @@ def test_a_strap_slot_of_any_proportion_has_round_ends(width, height):
     assert drawn.bounds == pytest.approx((5, -1, 5 + width, height - 1), abs=1e-3)
 
 
-MADE: list[tuple[str, dict[str, Any]]] = [
+MADE = [
     ("sleeve-curved", {"sheet.strap_slot_mm": [3, 3]}),
     ("hex-19", {"layout.pitch_mm": 200}),
 ]
@@ -51,11 +48,11 @@ SECONDS = 20.0
 """Of processor time, at most."""
 
 
-def far_out(seed: int) -> tuple[str, dict[str, Any]]:
+def far_out(seed):
     """Return a template and changes of it, each a hundredth to a hundred times the usual value, or nonsense."""
     pick = random.Random(seed)
 
-    def changed(value: Any) -> Any:
+    def changed(value):
         if isinstance(value, list):
             return [changed(each) for each in value]
         if pick.random() < 0.06:

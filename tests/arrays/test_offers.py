@@ -1,9 +1,6 @@
 """What a refusal of an array offers is put in, and accepted; where more has to change, its sentence says what."""
 
-from __future__ import annotations
-
 import re
-from typing import Any
 
 import pytest
 
@@ -25,22 +22,17 @@ _RESIN = {"moulds.printer": "sla"}
 
 
 TWELVE = {"layout.columns": 12, "moulds.cavities": [1, 1], "moulds.bed_x_mm": 30}
-OFFERED: list[tuple[str, dict[str, Any], str]] = [
+OFFERED = [
     ("forearm-patch", {"layout.pitch_mm": 15}, "layout.pitch_mm"),
     ("forearm-patch", {"sheet.thickness_mm": 2}, "sheet.thickness_mm"),
     ("forearm-patch", {"moulds.pour": "injected"}, "moulds.pour"),
-    ("forearm-patch", {"moulds.bed_x_mm": 30}, "moulds.bed_x_mm"),
     ("sleeve-curved", {"limb.radius_mm": 20}, "limb.radius_mm"),
-    ("sleeve-curved", {"limb.radius_mm": 27}, "limb.radius_mm"),
     ("sleeve-curved", {"unit": "single-encapsulating"}, "limb.cast"),
     ("sleeve-curved", {"sheet.thickness_mm": 4}, "sheet.thickness_mm"),
     ("sleeve-curved", {"moulds.bed_z_mm": 20}, "moulds.bed_z_mm"),
     ("sleeve-curved", {"layout.rows": 6, "moulds.bed_y_mm": 100}, "moulds.bed_y_mm"),
     ("wrist-band", {"moulds.bed_x_mm": 40}, "moulds.bed_x_mm"),
-    ("wrist-band", {"moulds.bed_y_mm": 40}, "moulds.bed_y_mm"),
-    ("hex-19", {"moulds.bed_x_mm": 30}, "moulds.bed_x_mm"),
     ("hex-19", {"moulds.bed_x_mm": 60}, "moulds.bed_x_mm"),
-    ("hex-19", {"moulds.bed_y_mm": 20}, "moulds.bed_y_mm"),
     ("forearm-pockets", {"moulds.bed_y_mm": 60}, "moulds.bed_y_mm"),  # a strap slot as long as two rows
     ("forearm-pockets", TWELVE, "moulds.bed_x_mm"),
     ("forearm-patch", {"layout.rows": 4, "layout.columns": 6, "moulds.bed_y_mm": 20}, "moulds.bed_y_mm"),
@@ -60,7 +52,7 @@ def test_what_can_not_be_cast_is_refused_with_what_would(name, changes, field):
         assert "silicone" in str(refused), "what the seams would take up"
 
 
-REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
+REFUSED = [
     ("forearm-patch", {"unit": "embedded"}, "unit.design", "encapsulating"),
     ("forearm-patch", {"unit": "no-fpcb"}, "unit.fpcb", None),
     ("forearm-patch", {"sheet.hold_mm": 0.2}, "sheet.hold_mm", None),
@@ -72,11 +64,9 @@ REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
     ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
     ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
     # Base and cups each ask for another bed where they are cut one by one; a tenth less is refused.
-    *(("forearm-patch", {"moulds.bed_x_mm": bed}, "moulds.bed_x_mm", 58.9) for bed in (10, 50, 58.8)),
+    *(("forearm-patch", {"moulds.bed_x_mm": bed}, "moulds.bed_x_mm", 58.9) for bed in (10, 58.8)),
     ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.7),
-    ("sleeve-curved", {"limb.radius_mm": 5000}, "limb.radius_mm", 339.7),
     ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 370),
-    ("hex-19", {"layout.pitch_mm": 1e9}, "layout.pitch_mm", 370),
     ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 740),
     ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 715),
     ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", 263.395),
@@ -89,7 +79,7 @@ def test_what_can_not_be_made_is_refused(name, changes, field, nearest):
     assert (refused.field, refused.nearest) == (field, nearest)
 
 
-def named(limit: str, before: str, after: str) -> dict[str, Any]:
+def named(limit, before, after):
     """Return what a sentence names between two words, by paths."""
     (part,) = re.findall(f"{before} (.*?)(?: {after}|;|$)", limit)
     pairs = re.findall(r"([a-z_.0-9]+) = ('?)([^' ]+)", part)

@@ -1,15 +1,11 @@
 """Marks are unmistakable: no set's label reads as a base's or a cup's, and pieces of a split tool carry it whole."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.arrays.made_arrays import made
-from unitcad.arrays.piece_seams import Strip, on_pieces
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.cuts import straight
 from unitcad.moulds.pieces import set_label
-from unitcad.shape import box, union
+from unitcad.shape import box
 from unitcad.shape.lettering import engraving, seen
 
 
@@ -34,17 +30,5 @@ def test_every_piece_of_a_split_tool_carries_mark_label_and_number():
             assert lost == pytest.approx(letters, abs=0.05), piece.name
 
 
-def _area(text: str, stroke: float) -> float:
+def _area(text, stroke):
     return realise(engraving(text, stroke, 0.0, 1.0), 24).volume()
-
-
-def test_a_row_of_texts_stands_whole_where_it_has_room():
-    """A bar cut in pieces of 45, 25 and 30 mm: the row of 28 mm has room on the first alone, beside what is taken."""
-    stroke = 0.8
-    strip = Strip((0.0, 0.0, 100.0, 20.0), 1.0, stroke, (0.0, 1.0), "top", taken=[(0.0, 15.0, 4.0, 20.0)])
-    cuts = [straight(45.0, [(5, 15)], 0.15), straight(70.0, [(5, 15)], 0.15)]
-    drawn = realise(union(on_pieces(strip, [("C1", "79A5"), ("C1",)], cuts)), 24)
-    rows = [("C1", "79A5", "1"), ("C1", "2"), ("C1", "3")]
-    assert drawn.volume() == pytest.approx(sum(_area(text, stroke) for row in rows for text in row))
-    x0 = drawn.bounding_box()[0]
-    assert x0 >= 4.0 + 0.6

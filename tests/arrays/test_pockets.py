@@ -1,9 +1,6 @@
 """Pockets: every mould check holds on the tray, and a fault drawn into it is caught."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -15,7 +12,7 @@ from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.errors import Refusal
 from unitcad.moulds.cavities import BALANCE
-from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, union
+from unitcad.shape import box, cut, cylinder, moved, polygon, union
 from unitcad.shape.tree import Revolve
 from unitcad.validation import load
 
@@ -45,7 +42,7 @@ def test_a_pocket_is_smaller_than_its_unit_by_the_hold():
 LAYOUT = {"kind": "grid", "columns": 2, "rows": 2, "pitch_mm": 24}
 
 
-def _of(unit: str, **more: Any) -> dict[str, Any]:
+def _of(unit, **more):
     return {"name": "own", "array": "pockets", "unit": unit, "layout": LAYOUT, **more}
 
 
@@ -94,6 +91,6 @@ _FAULTS = [
 def test_a_fault_in_the_tray_is_caught(code, what, change):
     array = load_array("forearm-pockets")
     plan = constructions()["pockets"].plan(array)
-    base: Shape = change(plan.tools[0].shape)
+    base = change(plan.tools[0].shape)
     altered = replace(plan, tools=(replace(plan.tools[0], shape=base), *plan.tools[1:]))
     assert code in broken(patch_moulds(array, altered))

@@ -1,22 +1,19 @@
 """Pry slots: every piece of a base that is cut has one at an edge, clear of what stands there; else it is refused."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
-from typing import Any
 
 import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions.back_sheet import _base_letters, drawing_of, pieces
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.errors import Refusal
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.shape import box, union
 
 THREE = {"moulds.bed_x_mm": 60}
-CUT: list[dict[str, Any]] = [
+CUT = [
     THREE,
     {"layout.columns": 12, "moulds.bed_x_mm": 110},
     {"layout.rows": 12},
@@ -31,7 +28,7 @@ CUT: list[dict[str, Any]] = [
 
 
 @cache
-def three() -> PatchMoulds:
+def three():
     return patch_moulds(load_array("forearm-patch", THREE))
 
 

@@ -1,10 +1,7 @@
 """Random array files: each is built with all mould checks kept, or refused with a field; none fails silently."""
 
-from __future__ import annotations
-
 import random
 import re
-from typing import Any
 
 import pytest
 
@@ -19,11 +16,11 @@ from unitcad.validation import default_template, put, templates
 QUICK, ALL = 12, 200
 
 
-def drawn(seed: int) -> dict[str, Any]:
+def drawn(seed):
     """Return the data of a random array file: most of them near to what can be made, some far from it."""
     pick = random.Random(seed)
     kind = pick.choice(["grid", "grid", "hex", "ring", "list"])
-    layouts: dict[str, dict[str, Any]] = {
+    layouts = {
         "grid": {
             "columns": pick.randint(1, 5),
             "rows": pick.randint(1, 4),
@@ -33,13 +30,13 @@ def drawn(seed: int) -> dict[str, Any]:
         "ring": {"count": pick.randint(2, 7), "bands": pick.randint(1, 2), "band_pitch_mm": pick.randint(15, 40)},
         "list": {"points_mm": [[round(pick.uniform(-60, 60), 2) for _ in "xy"] for _ in range(pick.randint(1, 5))]},
     }
-    data: dict[str, Any] = {
+    data = {
         "name": f"random-{seed}",
         "array": pick.choice(list(constructions())),
         "unit": {"like": pick.choice([default_template(), default_template(), *templates()])},
         "layout": {"kind": kind, **layouts[kind]},
     }
-    changes: dict[str, Any] = {
+    changes = {
         "limb.radius_mm": pick.randint(10, 60),
         "sheet.thickness_mm": round(pick.uniform(0.6, 3.5), 2),
         "sheet.margin_mm": round(pick.uniform(1, 12), 2),
@@ -86,7 +83,7 @@ def test_a_random_array_on_a_small_bed_is_made_in_pieces_or_refused(seed):
     judge(data)
 
 
-def judge(data: dict[str, Any]) -> None:
+def judge(data):
     """Build the moulds of an array file with every check, or see it refused with field, limit and what is accepted."""
     try:
         moulds = patch_moulds(load_array(data))

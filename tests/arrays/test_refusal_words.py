@@ -1,9 +1,5 @@
 """What refusals of arrays say: digits, names, keys of other kinds, keys that do nothing."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 from tests.arrays.made_arrays import refusal_of
@@ -44,7 +40,7 @@ def test_cavities_of_a_back_sheet_are_refused_and_not_passed_over(cavities):
 
 def test_a_sheet_is_as_thick_as_fits_where_no_thickness_is_asked_for():
     points = {"kind": "list", "points_mm": [[0, 0], [40, 0]]}
-    data: dict[str, Any] = {"name": "thin", "array": "pockets", "unit": "embedded", "layout": points}
+    data = {"name": "thin", "array": "pockets", "unit": "embedded", "layout": points}
     data["place"] = [{"at": "P2", "unit": "encapsulating"}]
     most = refusal_of(data, ["sheet.thickness_mm=2"]).nearest
     assert load_array(data).sheet.thickness_mm == pytest.approx(most, abs=1e-3)

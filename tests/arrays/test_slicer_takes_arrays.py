@@ -1,7 +1,5 @@
 """PrusaSlicer slices every piece of every tool of every shipped array, and repairs none of them."""
 
-from __future__ import annotations
-
 import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 from scipy.stats import ttest_ind, ttest_rel
-from typer.testing import CliRunner
+from signals import FULL, RATE, TIME, noise, repeats, wave, write
 
 from benchmarks.accuracy.synthetic_records import Scenario, synthetic
-from unitcad.cli import app
-from unitcad.errors import Refusal
+from tests.in_process import unitcad
+from tests.refusals import refuses
 from unitcad.files import sha256
 from unitcad.lab import measure_command, measuring
 from unitcad.lab.campaign import read_campaign
@@ -22,37 +22,12 @@ from unitcad.lab.chains import CHAINS
 from unitcad.lab.measuring import level, measure
 from unitcad.lab.record import RULES
 
-RATE = 2000
-TIME = np.arange(2 * RATE) / RATE
-FULL = 500.0
 NAME = 'name = "t"\n'
 UM = '[sensor]\nquantity = "displacement"\nunit = "um"\n'
 HEAD = f"{UM}scale = 500.0\n"
 BOTH = '[chain]\nuse = ["line", "bandpass"]\n'
 UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
 PAIRED = '[recording]\nchannel = 1\nmotor_channel = 2\n[[unit]]\nname = "a"\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
-
-
-def noise(size=1.0, seed=1):
-    return size * np.random.default_rng(seed).standard_normal(len(TIME))
-
-
-def wave(size, hertz=121.3, phase=0.0):
-    return size * np.cos(2 * np.pi * hertz * TIME + phase)
-
-
-def write(path, *channels, rate=RATE):
-    wavfile.write(path, rate, np.column_stack(channels).astype("<f4") / np.float32(FULL))
-
-
-def repeats(folder, **lines):
-    """Write three records of each line, or of each pair of lines, in noise: its letter and a number."""
-    for name, channels in lines.items():
-        for i in range(3):
-            several = channels if isinstance(channels, tuple) else (channels,)
-            seeds = [[i, k, ord(name)] for k in range(len(several))]
-            columns = (x * (1 + 0.005 * i) + noise(seed=seed) for x, seed in zip(several, seeds, strict=True))
-            write(folder / f"{name}{i}.wav", *columns)
 
 
 def campaign(folder, text, head=HEAD):
@@ -93,8 +68,8 @@ def test_a_campaign_has_the_levels_of_its_truth(folder):
 def test_the_files_of_a_campaign(folder, monkeypatch):
     monkeypatch.chdir(folder)
     for out in ("two", "one"):
-        done = CliRunner().invoke(app, ["measure", "c.toml", "-o", out])
-        assert (done.exit_code, done.output.splitlines()[-1]) == (0, out)
+        done = unitcad("measure", "c.toml", "-o", out)
+        assert (done.returncode, done.stdout.splitlines()[-1]) == (0, out)
     files = {file.name: file.read_bytes() for file in Path("one").iterdir()}
     assert files == {file.name: file.read_bytes() for file in Path("two").iterdir()}
     measured = tomllib.loads(files["measured.toml"].decode())
@@ -107,7 +82,7 @@ def test_the_files_of_a_campaign(folder, monkeypatch):
     assert set(files) == {"measured.toml", "measure.json", "measure.html", "decay-01.svg", *charts}
     page = files["measure.html"].decode().replace("http://www.w3.org/2000/svg", "")
     assert not [part for part in ("http://", "<script") if part in page]
-    again = json.loads(CliRunner().invoke(app, ["measure", "c.toml", "--json"]).stdout)
+    again = json.loads(unitcad("measure", "c.toml", "--json").stdout)
     assert again["levels"] == measured["level"]
 
 
@@ -160,9 +135,8 @@ def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     repeats(tmp_path, m=wave(300), e=wave(90))
     use = BOTH.replace("bandpass", "rms")
-    with pytest.raises(Refusal, match="rms") as refused:
+    with refuses("chain.use.1", "rms"):
         campaign(tmp_path, use + UNIT)
-    assert refused.value.field == "chain.use.1"
     monkeypatch.setitem(CHAINS, "rms", "rms_chain:chain")
     result = campaign(tmp_path, use + UNIT)
     levels = {one.chain: one.level.value for one in result.levels}
@@ -180,23 +154,19 @@ def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):
     ("code", "x", "rate"),
     [
         ("L102", 100 * np.cos(2 * np.pi * 110 * np.arange(800) / 400), 400),
-        ("L105", wave(100, 100.2) + noise(), RATE),
         ("L106", wave(100, 101.0) + noise(), RATE),
-        ("L108", (wave(100, 120) + noise())[:300], RATE),
         ("L111", noise(0.001), RATE),
     ],
 )
-def test_a_faulty_record_is_a_finding(code, x, rate, tmp_path, monkeypatch):
+def test_a_faulty_record_is_a_finding(code, x, rate, tmp_path):
     for i in range(6):
         write(tmp_path / f"{'me'[i % 2]}{i // 2}.wav", x + 1e-4 * i, rate=rate)
     (tmp_path / "c.toml").write_text(NAME + HEAD + BOTH + UNIT)
-    monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, ["measure", "c.toml", "-o", "out"])
-    assert done.exit_code == 1, done.output
-    findings = json.loads(Path("out/measure.json").read_text())["findings"]
-    assert code in {one["code"] for one in findings}, findings
-    levels = tomllib.loads(Path("out/measured.toml").read_text())["level"]
-    assert (levels == []) == (RULES[code].severity == "error")
+    done = unitcad("measure", "c.toml", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    found = json.loads(done.stdout)
+    assert code in {one["code"] for one in found["findings"]}, found
+    assert (found["levels"] == []) == (RULES[code].severity == "error")
 
 
 def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path):
@@ -311,16 +281,10 @@ def test_a_silent_record_has_a_page(tmp_path):
     ],
 )
 def test_what_is_not_known_is_asked_for(head, keys, field, tmp_path):
-    for name, text in {
-        "w": "u\n1.5\n0.5",
-        "x": "u\n0.5\n1.5",
-        "t": "u,v\n0.5,2.5\n1.5,1.5",
-        "v": "u (V)\n0.5\n1.5",
-    }.items():
-        (tmp_path / f"{name}.csv").write_text(text + "\n2.5,3.5" * 50 if name == "t" else text + "\n2.5" * 50)
-    with pytest.raises(Refusal) as refused:
+    for name, text in {"w": "u\n1.5", "x": "u\n0.5", "t": "u,v\n0.5,2.5", "v": "u (V)\n0.5"}.items():
+        (tmp_path / f"{name}.csv").write_text(text + ("\n2.5,3.5" if name == "t" else "\n2.5") * 50)
+    with refuses(field):
         campaign(tmp_path, f'{head}\n[[unit]]\nname = "a"\n{keys}\n', UM)
-    assert refused.value.field == field
 
 
 @pytest.mark.parametrize(
@@ -343,9 +307,8 @@ def test_what_a_campaign_names_is_checked_first(tmp_path, monkeypatch, old, new,
     for name in ("x.svd", "x.odd"):
         (tmp_path / name).write_bytes(b"x")
     monkeypatch.setattr(measuring, "measure_record", lambda *_: pytest.fail("a record was measured"))
-    with pytest.raises(Refusal) as refused:
+    with refuses(field) as refused:
         campaign(tmp_path, UNIT.replace(old, new))
-    assert refused.value.field == field
     if nearest is not None:
         assert refused.value.nearest == nearest
 
@@ -358,9 +321,8 @@ def test_a_rate_that_the_file_contradicts_is_refused(tmp_path, ending):
         file.with_suffix(".csv").write_text(f"time (s),u\n{rows}\n")
     text = f"[recording]\nchannel = {1 if ending == 'wav' else 2}\nrate_hz = 2001.0\n{UNIT.replace('wav', ending)}"
     assert campaign(tmp_path, text).levels
-    with pytest.raises(Refusal) as refused:
+    with refuses("recording.rate_hz") as refused:
         campaign(tmp_path, text.replace("2001", "2010"))
-    assert refused.value.field == "recording.rate_hz"
     assert refused.value.nearest == pytest.approx(2000.0, rel=1e-6)
 
 
@@ -408,9 +370,9 @@ def test_records_of_two_loggers_are_one_campaign(loggers):
     ],
 )
 def test_an_override_that_can_not_be_meant_is_refused(loggers, own, field, nearest):
-    with pytest.raises(Refusal) as refusal:
+    with refuses(field) as refused:
         campaign(loggers, f"{BASE}[[recording.override]]\n{own}{LOGGERS}", UM)
-    assert (refusal.value.field, refusal.value.nearest) == (field, nearest)
+    assert refused.value.nearest == nearest
 
 
 # Units between columns, files and records.
@@ -440,7 +402,10 @@ def sensor(quantity, unit, more="", table="sensor"):
 
 
 VELOCITY, VOLTS = sensor("velocity", "mm/s"), sensor("velocity", "mm/s", 'scale = 50.0\nper = "V"\n')
+OMEGA = 2 * np.pi * 125.3
+TWO_SENSORS = sensor("velocity", "mm/s", "scale = 50.0\n") + sensor("displacement", "um", table="motor_sensor")
 MOTION = [
+    (TWO_SENSORS, ("nm", 1e6 / OMEGA), ("V", 1 / 50)),
     (VELOCITY, ("mm/s", 1.0), ("um/s", 1000.0)),
     (sensor("acceleration", "m/s2"), ("g", 1 / 9.80665), ("m/s^2", 1.0)),
     (sensor("displacement", "um"), ("mm", 0.001), ("µm", 1.0)),
@@ -451,22 +416,16 @@ MOTION = [
 ]
 
 
-@pytest.mark.parametrize("paired", [True, False])
-@pytest.mark.parametrize(("table", "motor", "edge"), MOTION)
+@pytest.mark.parametrize(("paired", "table", "motor", "edge"), [(i % 2, *one) for i, one in enumerate(MOTION)])
 def test_units_that_a_file_states_are_converted(tmp_path, table, motor, edge, paired):
     result = measured(tmp_path, table, motor, edge, paired)
     assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)
-
-
-OMEGA = 2 * np.pi * 125.3
 
 
 @pytest.mark.parametrize(
     ("table", "motor", "um"),
     [
         (sensor("displacement", "um"), ("um", 300.0), 300.0),
-        (VELOCITY, ("mm/s", 1.0), 1e3 / OMEGA),
-        (sensor("acceleration", "m/s2"), ("m/s2", 1.0), 1e6 / OMEGA**2),
         (sensor("acceleration", "g"), ("g", 1.0), 9.80665e6 / OMEGA**2),
         (sensor("velocity", "mm/s", 'scale = 50.0\nper = "mV"\n'), ("mV", 1.0), 50e3 / OMEGA),
     ],
@@ -491,14 +450,5 @@ def test_a_motion_is_a_displacement_over_j_omega(tmp_path, table, motor, um):
     ],
 )
 def test_units_that_nobody_can_convert_are_refused(tmp_path, table, motor, edge, field, words, paired):
-    with pytest.raises(Refusal) as refused:
+    with refuses(field, *words):
         measured(tmp_path, table, (motor, 1.0), (edge, 1.0), paired)
-    assert refused.value.field == field
-    assert all(word in str(refused.value) for word in words), str(refused.value)
-
-
-def test_two_sensors_may_have_two_units(tmp_path):
-    tables = sensor("velocity", "mm/s", "scale = 50.0\n") + sensor("displacement", "um", table="motor_sensor")
-    size = 1e3 / OMEGA  # um of 1 mm/s
-    result = measured(tmp_path, tables, ("nm", 1e3 * size), ("V", 1 / 50), paired=False)
-    assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)

@@ -1,7 +1,5 @@
 """An error about a recording of many channels names the first ones and counts the others."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.robustness.test_long_lists import MANY, check_error_is_short

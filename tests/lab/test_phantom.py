@@ -1,7 +1,5 @@
 """`unitcad phantom`: recipe and box against their lengths, response and echo, refusals, a spec's tissue."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -6,26 +6,18 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 from scipy.optimize import curve_fit
+from scipy.signal import lfilter
+from signals import RATE, TIME, noise, wave
 
 from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, Scenario, synthetic
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable
 from unitcad.lab.chains import ChainTable, Mains, bandpass
-from unitcad.lab.chains.line import DROP_OUT, fit_line, running_part
+from unitcad.lab.chains.line import DROP_OUT, fit_line, of_mean, running_part
 from unitcad.lab.record import measure_record
 
-RATE = 2000
-TIME = np.arange(2 * RATE) / RATE
 SENSOR = SensorTable(quantity="displacement", unit="um")
 BAND = (60.0, 250.0)
-
-
-def noise(size=1.0, seed=1):
-    return size * np.random.default_rng(seed).standard_normal(len(TIME))
-
-
-def wave(size, hertz, phase=0.0):
-    return size * np.cos(2 * np.pi * hertz * TIME + phase)
 
 
 def turning(size, hertz):
@@ -48,8 +40,7 @@ def severities(result):
 
 
 def fitted(x, rate=RATE, **options):
-    fit = fit_line(x, rate, **options)  # type: ignore[arg-type]
-    assert fit is not None
+    fit = fit_line(x, rate, **options)
     return fit
 
 
@@ -80,10 +71,10 @@ def test_a_line_is_what_a_nonlinear_fit_gives():
     assert fit.frequency_hz == pytest.approx(values[1], abs=0.01)
 
 
-@pytest.mark.parametrize("size", [0.1, 0.5, 0.9])
-@pytest.mark.parametrize("away", [-14.0, -3.0, 3.0, 8.0])
+@pytest.mark.parametrize("size", [0.1, 0.9])
+@pytest.mark.parametrize("away", [-14.0, -3.0, 8.0])
 def test_a_second_line_is_named_at_its_frequency(tmp_path, away, size):
-    result = record(tmp_path, wave(100, 121.3) + wave(100 * size, 121.3 + away, 1.0) + noise(3.0))
+    result = record(tmp_path, wave(100) + wave(100 * size, 121.3 + away, 1.0) + noise(3.0))
     (frequency,) = [float(word) for word in said(result)["L104"].split() if word.replace(".", "").isdigit()]
     assert frequency == pytest.approx(121.3 + away, abs=0.5)
     assert not result.usable
@@ -92,7 +83,7 @@ def test_a_second_line_is_named_at_its_frequency(tmp_path, away, size):
 @pytest.mark.parametrize("away", [0.3, 1.0, 2.0])
 def test_a_slow_beat_of_two_lines_gives_no_level(tmp_path, away):
     """The phase follows it, so that it looks like a modulation."""
-    result = record(tmp_path, wave(100, 121.3) + wave(60, 121.3 + away, 1.0) + noise())
+    result = record(tmp_path, wave(100) + wave(60, 121.3 + away, 1.0) + noise())
     assert ("L107", "error") in severities(result)
 
 
@@ -147,8 +138,8 @@ def test_a_record_without_a_line_has_none(value):
 def test_noise_alone_is_called_a_drop_out_in_one_record_of_a_thousand_at_most():
     rng = np.random.default_rng(5)
     for count in (200, 4000):
-        x = np.abs(rng.standard_normal((5000, count)))
-        assert np.sum(x.max(axis=1) > DROP_OUT * 1.4826 * np.median(x, axis=1)) <= 5
+        x = np.abs(rng.standard_normal((2000, count)))
+        assert np.sum(x.max(axis=1) > DROP_OUT * 1.4826 * np.median(x, axis=1)) <= 2
 
 
 @pytest.mark.parametrize("zero_phase", [True, False])
@@ -169,7 +160,7 @@ def gated(start, end, size=1.0):
     return np.where(inside, 40.0 * np.sin(2 * np.pi * 123.4 * TIME), 0.0) + noise(size)
 
 
-@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (1.5, 2.1), (0.0, 0.9), (0.5, 1.4), (0.9, 1.3), (1.7, 2.1)])
+@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (0.0, 0.9), (0.5, 1.4), (1.7, 2.1)])
 @pytest.mark.parametrize("size", [0.01, 3.0])
 def test_a_motor_that_runs_for_less_than_half_is_measured(tmp_path, start, end, size):
     result = record(tmp_path, gated(start, end, size) + wave(5, 50))
@@ -205,7 +196,7 @@ def test_beats_and_sweeps_are_no_silence():
 @pytest.mark.parametrize("at", [60.0, 5.0, 0.0, -80.0])
 def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path, rail, at):
     """Down to a rail beyond the line's middle: more than half of the samples then lie on the plateau."""
-    result = record(tmp_path, 7.0 + rail * np.minimum(wave(100, 121.3) + noise(), at))
+    result = record(tmp_path, 7.0 + rail * np.minimum(wave(100) + noise(), at))
     assert severities(result) == {("L101", "error")}
     assert not result.usable
 
@@ -214,7 +205,7 @@ def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path, rail, at):
 @pytest.mark.parametrize("hz", [0.6, 2.5, 9.0])
 def test_a_slow_modulation_is_unsteady_and_one_line(tmp_path, hz, size):
     """Two equal lines to either side of one are one amplitude that goes up and down."""
-    result = record(tmp_path, (1 + wave(size, hz, 0.4)) * wave(100, 121.3) + noise())
+    result = record(tmp_path, (1 + wave(size, hz, 0.4)) * wave(100) + noise())
     assert f"amplitude varies by {'2' if size == 0.3 else '8'}" in said(result)["L107"]  # over the root of 2
     assert severities(result) == {("L107", "warning")}
     assert result.amplitude_um == pytest.approx(100.0, abs=max(3 * result.u_um, 1.0))
@@ -224,7 +215,7 @@ def test_a_slow_modulation_is_unsteady_and_one_line(tmp_path, hz, size):
     ("ratio", "found"), [(12.0, set()), (7.0, {("L118", "warning")}), (1.0, {("L118", "warning")})]
 )
 def test_a_low_signal_to_noise_is_said(tmp_path, ratio, found):
-    result = record(tmp_path, wave(10, 121.3) + noise(10 / ratio))
+    result = record(tmp_path, wave(10) + noise(10 / ratio))
     assert severities(result) == found
     assert result.usable
 
@@ -239,17 +230,14 @@ def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path):
 
 @pytest.mark.parametrize(("first", "last"), [(115.0, 139.0), (139.0, 115.0)])
 @pytest.mark.parametrize("order", [0, 1])
-def test_a_sweep_is_unsteady(tmp_path, first, last, order):
+def test_a_sweep_is_unsteady_and_only_its_steady_part_is_used(tmp_path, first, last, order):
     """A velocity's amplitude rises with the frequency, too."""
     hertz = first + (last - first) * TIME / 2
-    assert "L107" in said(record(tmp_path, turning(100 * (hertz / first) ** order, hertz)))
-
-
-def test_a_record_that_is_steady_for_less_than_half_says_so(tmp_path):
-    result = record(tmp_path, turning(100, 115 + 12 * TIME))
-    lengths = [one.message for one in result.findings if "steady for" in one.message]
-    assert lengths == [f"steady for {result.steady_s:.2f} s of 2.00 s; only that part was used"]
-    assert result.steady_s < 1
+    result = record(tmp_path, turning(100 * (hertz / first) ** order, hertz))
+    used = f"steady for {result.steady_s:.2f} s of 2.00 s; only that part was used"
+    if first < last:
+        assert [one.message for one in result.findings if one.code == "L107"].count(used) == 1
+    assert "L107" in said(result)
     assert result.as_dict()["length_s"] == 2.0
 
 
@@ -294,6 +282,15 @@ def test_a_record_of_few_samples_has_no_line_and_no_warning(tmp_path, count):
 def test_a_record_of_more_than_a_minute_is_refused(tmp_path):
     with pytest.raises(Refusal, match=r"a\.wav: lasts 62 s; cut the record to 60 s or less"):
         record(tmp_path, np.zeros(62 * RATE))
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.8])
+def test_two_uncertainties_hold_the_mean_of_correlated_values(correlation):
+    """The true mean is 0. Of 800 series 95 % should hold it; with a correlation of 0.8 and none assumed, 50 % do."""
+    draws = np.random.default_rng(1).standard_normal((800, 150))
+    series = lfilter([1.0], [1.0, -correlation], draws, axis=1)[:, 50:]
+    held = [abs(one.mean()) <= 2 * of_mean(one, 0.0)[0] for one in series]
+    assert 0.92 < np.mean(held) < 0.985
 
 
 ODD = {

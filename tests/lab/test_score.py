@@ -1,7 +1,5 @@
 """`unitcad score`: a digitised figure against every model with constants that were fixed before; what is refused."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

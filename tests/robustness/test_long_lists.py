@@ -1,8 +1,6 @@
 """An error that lists names from a file names the first ones and counts the others."""
 
-import subprocess
-import sys
-
+from tests.in_process import unitcad
 from unitcad.text import some
 
 MANY = 300
@@ -12,7 +10,7 @@ def check_error_is_short(words, files, folder):
     """Check that a command which fails on long lists of names in its files has no long line."""
     for name, text in files.items():
         (folder / name).write_text(text)
-    done = subprocess.run([sys.executable, "-m", "unitcad", *words], cwd=folder, capture_output=True, text=True)
+    done = unitcad(*words, cwd=folder)
     assert done.returncode == 2
     assert max(map(len, done.stderr.splitlines())) < 500
     assert "more" in done.stderr or "..." in done.stderr

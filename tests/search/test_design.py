@@ -9,15 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unitcad.attenuation.curve import crosstalk_ratio, layered_block
+from tests.in_process import unitcad
+from tests.refusals import refuses
+from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.receivers import unit_mass
 from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
+from unitcad.kernels.mesh import bounds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search import design_files, proposals
-from unitcad.search.candidates import candidates, grid, sequences_of, spec_data
+from unitcad.search.candidates import candidates, sequences_of, spec_data
 from unitcad.search.design_files import front
 from unitcad.search.proposals import EQUAL, explain, invert, kinds, name_of
 from unitcad.search.target_file import load_target, target_of
@@ -72,7 +75,7 @@ def found():
 def test_each_candidate_is_what_its_spec_is_alone(found):
     """The table's columns against the spec's own estimate, mass and moulds, drawn at random."""
     assert found.count == sum(len(sequences_of("abc", len(g.lengths.walls))) for g in found.geometries)
-    for row in np.random.default_rng(5).integers(0, found.count, 25):
+    for row in np.random.default_rng(5).integers(0, found.count, 15):
         spec = from_data(spec_data(found.target, found.lengths(row), found.materials(row)))
         variant = estimate_input(spec)
         alone = predictive_of([variant])
@@ -83,38 +86,12 @@ def test_each_candidate_is_what_its_spec_is_alone(found):
         made = procedure(MouldSet(spec), [400.0] * len(spec.layers), 9e3)
         steps = [*(step for pour in made.pours for step in pour.steps), *made.release]
         assert found.cure_hours[row] == pytest.approx(sum(step.minutes + step.wait_min for step in steps) / 60)
-        tops = [body.shape for body in MouldSet(spec).unit]
-        assert tops
-        assert found.height_mm[row] == pytest.approx(_top(MouldSet(spec)), abs=0.02)
-
-
-def _top(moulds):
-    from unitcad.kernels.mesh import bounds
-
-    return max(bounds(moulds.mesh(body))[5] for body in moulds.unit)
-
-
-def test_mass_is_that_of_the_drawn_bodies(found):
-    """The slot of the tail is not taken off: less than 3 %."""
-    from unitcad.catalogue import materials
-
-    row = int(np.argmax(found.probability))
-    spec = from_data(spec_data(found.target, found.lengths(row), found.materials(row)))
-    moulds, known = MouldSet(spec), materials()
-    drawn = sum(
-        moulds.mesh(body).volume() * float(known[layer.material].density_g_cm3) / 1e3
-        for body, layer in zip([b for b in moulds.unit if b.name.startswith("layer")], spec.layers, strict=True)
-    )
-    motor = 1e3 * estimate_input(spec).geometry.motor_mass.middle
-    assert found.mass_g[row] - motor == pytest.approx(drawn, rel=0.03)
+        moulds = MouldSet(spec)
+        top = max(bounds(moulds.mesh(body))[5] for body in moulds.unit)
+        assert found.height_mm[row] == pytest.approx(top, abs=0.02)
 
 
 def test_crosstalk_is_that_of_the_layered_curve(found):
-    variant = found.geometries[0].variant
-    block = layered_block(variant)["drives"][variant.drive]["u"]
-    ratio = crosstalk_ratio(variant, variant.diameter / 2 + 13e-3)
-    for end in ("value", "low", "high"):
-        assert getattr(ratio, end) == pytest.approx(block[end][13], rel=2e-3)
     at_pitch = crosstalk_ratio(found.geometries[0].variant, 20e-3, spread=False).middle
     assert found.crosstalk[found.geometry == 0] == pytest.approx(at_pitch)
 
@@ -133,7 +110,8 @@ def test_kinds_that_the_evidence_cannot_tell_apart_are_equal_and_the_easier_one_
 
 def test_lengths_are_not_ranked_and_the_measured_ones_stand_for_their_kind():
     """Three tenths of a millimetre of wall change no median; only the range is wider."""
-    made = invert(_target({"layers": [2], "wall_mm": [1.0, 2.0], "step_mm": 0.25}), check=False)
+    made = invert(_target({"layers": [2], "wall_mm": [1.0, 2.1], "step_mm": 0.25}), check=False)
+    assert max(max(one.lengths.walls) for one in made.found.geometries) == 2.1  # the last step is shorter
     for one in made.data["proposals"][:2]:
         assert one["walls_mm"] == [1.25, 1.25]
         assert "the evidence does not rank them" in one["lengths_gain"]
@@ -165,9 +143,8 @@ def test_walls_of_two_millimetres_do_not_bring_an_open_ring_to_six_per_cent():
     ],
 )
 def test_an_impossible_target_is_refused_with_the_nearest_that_is_possible(goals, field):
-    with pytest.raises(Refusal, match="none of") as refused:
+    with refuses(field, "none of") as refused:
         invert(_target(**goals), check=False)
-    assert refused.value.field == field
     assert invert(_target(**_changed(goals, refused.value)), check=False).data["proposals"]
 
 
@@ -176,7 +153,7 @@ def _changed(goals, refused):
     return {"edge_max": 0.06, **goals} | {one.field.split(".")[1]: one.nearest for one in (refused, *refused.others)}
 
 
-@pytest.mark.parametrize("targets", [18, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("targets", [12, pytest.param(60, marks=pytest.mark.long)])
 def test_what_is_offered_for_several_impossible_targets_is_accepted_together(targets):
     """Targets drawn at random over and under what there is: each refusal's offers are accepted, all at once."""
     rng, refusals, several = np.random.default_rng(17), 0, 0
@@ -201,14 +178,6 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
             assert invert(_target(**_changed(goals, refused)), check=False).data["proposals"], goals
     assert refusals > targets / 2
     assert several > targets / 6
-
-
-def test_limits_that_exclude_each_other_are_named_together():
-    with pytest.raises(
-        Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
-    ) as refused:
-        invert(_target(mass_max_g=0.3, cure_hours_max=1.0), check=False)
-    assert "target.cure_hours_max" in [one.field for one in refused.value.others]
 
 
 def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk():
@@ -246,8 +215,7 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch):
     def judged(spec):
         return 9, ["C300 layer1: 0.1 against 0.2 mm"] if spec.layers[0].wall_mm == 1.25 else []
 
-    for module in (proposals, proposals):
-        monkeypatch.setattr(module, "castability", judged)
+    monkeypatch.setattr(proposals, "castability", judged)
     made = invert(_target())
     assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])
     assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]
@@ -345,32 +313,21 @@ def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(kno
     assert (folder / "notes.txt").read_text("utf-8") == "mine"
 
 
-def test_grid():
-    assert grid((1.0, 2.0), 0.25) == (1.0, 1.25, 1.5, 1.75, 2.0)
-    assert grid((1.0, 1.6), 0.25) == (1.0, 1.25, 1.5, 1.6)
-    assert grid((1.25, 1.25), 0.25) == (1.25,)
-    assert sequences_of(("a", "b"), 3) == [("a", "b", "a"), ("b", "a", "b")]
-    assert len(sequences_of("abc", 2)) == len(list(itertools.permutations("abc", 2)))
-
-
-def test_the_command_writes_its_folder_and_explains(run, tmp_path):
-    done = run("design", "published", "--no-check", cwd=tmp_path)
+def test_the_command_writes_its_folder_and_explains(tmp_path):
+    done = unitcad("design", "published", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-published"
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.8" in done.stdout
     made = {path.name for path in (tmp_path / "out/design-published").iterdir() if not path.name.startswith("front-")}
     assert made == {"design.html", "design.md", "design.json", "ranking.csv", "specs"}
-    as_json = json.loads(run("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)
+    as_json = json.loads(unitcad("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)
     assert as_json["folder"] == "out/design-published"
-    why = run("design", "published", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
+    why = unitcad("design", "published", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
     assert "vary.layers has no 3" in why.stdout
     assert not (tmp_path / "other").exists()
-    spec = as_json["proposals"][0]["file"]
-    built = run("build", spec, "--only", "estimate", cwd=tmp_path)
-    assert built.returncode == 0, built.stderr
-    target = tmp_path / "quiet.toml"
-    target.write_text("[target]\nedge_max = 0.01\n", "utf-8")
-    refused = run("design", "quiet.toml", "-o", "none", cwd=tmp_path)
+    assert unitcad("build", as_json["proposals"][0]["file"], "--only", "estimate", cwd=tmp_path).returncode == 0
+    (tmp_path / "quiet.toml").write_text("[target]\nedge_max = 0.01\n", "utf-8")
+    refused = unitcad("design", "quiet.toml", "-o", "none", cwd=tmp_path)
     assert refused.returncode == 2
     assert "target.edge_max = 0.01: none of " in refused.stderr
     assert not (tmp_path / "none").exists()

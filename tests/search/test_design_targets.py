@@ -4,8 +4,11 @@ import json
 import tomllib
 from unittest.mock import ANY
 
+import jsonschema
 import pytest
 
+from tests.in_process import unitcad
+from tests.refusals import refuses
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
@@ -24,7 +27,6 @@ from unitcad.validation.load import shipped_files
         ({"target": {"edge_max": 0.0}}, "target.edge_max", "at least 0.001", 0.001),
         ({"target": {"edge_max": 0.1, "edge_min": 0.2}}, "target.edge_min", "below edge_max", 0.05),
         ({"target": {"edge_max": 0.1, "crosstalk_ratio_max": 0.2}}, "target.pitch_mm", "required with", None),
-        ({"target": {"edge_max": 0.1, "pitch_mm": 900}}, "target.pitch_mm", "at most 200", 200.0),
         (
             {"target": {"edge_max": 0.1, "diameter_mm": 9}},
             "target.diameter_mm",
@@ -34,25 +36,20 @@ from unitcad.validation.load import shipped_files
         ({"at_hand": {"materials": ["ecoflex"]}}, "at_hand.materials.0", "unknown name", "ecoflex-00-50"),
         ({"at_hand": {"materials": ["ecoflex-00-10"] * 2}}, "at_hand.materials.1", "is given twice", None),
         ({"at_hand": {"printer": "prusa"}}, "at_hand.printer", "unknown name", ANY),
-        ({"at_hand": {"motors": ["LCM"]}}, "at_hand.motors.0", "unknown name", None),
         ({"at_hand": {"designs": ["embeded"]}}, "at_hand.designs.0", "unknown name", "embedded"),
         ({"at_hand": {"materials": ["ecoflex-00-50"]}}, "at_hand.materials", "no level can be estimated", None),
         ({"vary": {"wall_mm": [2.0, 1.0]}}, "vary.wall_mm", "from the least to the largest", [1.0, 2.0]),
         ({"vary": {"wall_mm": [0.1, 1.0]}}, "vary.wall_mm.0", "at least 0.5", 0.5),
         ({"vary": {"layers": [1, 9]}}, "vary.layers.1", "at most 2", 2),
-        ({"vary": {"layers": [2, 2]}}, "vary.layers.1", "is given twice", None),
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
-        ({"spec": {"layers": {}}}, "spec.layers", "unknown name", None),
         ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
 def test_what_is_refused(data, field, limit, nearest):
     given = data if "target" in data or not data else {"target": {"edge_max": 0.06}, **data}
-    with pytest.raises(Refusal) as refused:
+    with refuses(field, limit) as refused:
         candidates(target_of(given))
-    assert refused.value.field == field
-    assert limit in str(refused.value)
     assert nearest is ANY or refused.value.nearest == nearest
 
 
@@ -62,31 +59,24 @@ def test_a_fault_of_a_table_for_every_spec_is_named():
         candidates(target_of(wrong))
 
 
-def test_shipped_targets_load_and_are_listed(run):
-    assert set(shipped_files("targets")) == {"amplify", "published", "quiet-edge"}
-    for name in shipped_files("targets"):
+def test_shipped_targets_load_and_are_listed():
+    listed = unitcad("list", "targets").stdout
+    for name in ("amplify", "published", "quiet-edge"):
         assert load_target(name).name == name
-        assert name in run("list", "targets").stdout
+        assert name in listed
 
 
-def test_a_name_that_is_no_target_is_refused(run):
-    done = run("design", "quiet")
-    assert done.returncode == 2
-    assert "TARGET = 'quiet': unknown name; closest: quiet-edge" in done.stderr
-
-
-def test_a_target_to_start_from(run, tmp_path):
-    assert run("init", "mine", "--template", "quiet-edge", cwd=tmp_path).returncode == 0
+def test_a_target_to_start_from(tmp_path):
+    assert unitcad("init", "mine", "--template", "quiet-edge", cwd=tmp_path).returncode == 0
     assert load_target(tmp_path / "mine.toml").goals.edge_max == 0.06
-    done = run("init", "other", "--template", "quiet", cwd=tmp_path)
+    done = unitcad("init", "other", "--template", "quiet", cwd=tmp_path)
     assert done.returncode == 2
     assert "--template = 'quiet': unknown name; closest: quiet-edge" in done.stderr
     assert not (tmp_path / "other.toml").exists()
 
 
-def test_the_schema_takes_the_shipped_targets(run):
-    jsonschema = pytest.importorskip("jsonschema")
-    schema = json.loads(run("schema", "target").stdout)
+def test_the_schema_takes_the_shipped_targets():
+    schema = json.loads(unitcad("schema", "target").stdout)
     for path in shipped_files("targets").values():
         jsonschema.validate(tomllib.loads(path.read_text("utf-8")), schema)
 

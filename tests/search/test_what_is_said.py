@@ -15,8 +15,6 @@ from unitcad.search.target_file import load_target, target_of
 from unitcad.spec import to_data, to_toml
 from unitcad.validation import from_data, load
 
-FIELD = "target.edge_max"
-
 
 def _target(vary=None, **goals):
     return invert(target_of({"target": {"edge_max": 0.2, **goals}, "vary": vary or {}}), check=False)
@@ -32,13 +30,11 @@ def quiet():
     return invert(load_target("quiet-edge"), check=False)
 
 
-def test_the_estimate_of_a_proposals_spec_has_its_range(paper, quiet):
-    for made in (paper, quiet):
-        for spec, one in zip(made.specs, made.data["proposals"], strict=True):
-            answer = estimate_spec(spec)["answer"]
-            ends = [answer[end] for end in ("p10", "p50", "p90")]
-            assert ends == pytest.approx([one["edge"][end] for end in ("p10", "p50", "p90")], rel=1e-6)
-            assert answer["model"] == made.data["leads"]["model"] == "rule"
+def test_the_estimate_of_a_proposals_spec_has_its_range(quiet):
+    for spec, one in zip(quiet.specs, quiet.data["proposals"], strict=True):
+        answer = estimate_spec(spec)["answer"]
+        assert {end: answer[end] for end in ("p10", "p50", "p90")} == pytest.approx(one["edge"], rel=1e-6)
+        assert answer["model"] == quiet.data["leads"]["model"] == "rule"
 
 
 def test_lengths_that_were_never_measured_stand_in_the_title(paper, quiet):
@@ -130,7 +126,6 @@ def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons(tmp_path):
     (tmp_path / "wider.toml").write_text(to_toml(wider))
     over = [line for line in explain(made, str(tmp_path / "wider.toml"))["reasons"] if "crosstalk" in line]
     ratio = crosstalk_ratio(estimate_input(wider), 20e-3).value
-    assert ratio is not None
     assert over == [f"over a limit: crosstalk ratio {ratio:.3g} of at most 0.4"]
     assert not any("crosstalk" in line for line in explain(made, "encapsulating")["reasons"])
 
@@ -160,12 +155,6 @@ def test_a_crosstalk_that_is_out_of_reach_says_what_reaches_it():
     with pytest.raises(Refusal, match=r"; or target\.pitch_mm = 22.* in its place") as refused:
         _target(crosstalk_ratio_max=0.3, pitch_mm=20)
     assert "not tried, without a modulus: ecoflex-00-30" in str(refused.value)
-
-
-def test_what_is_typed_in_per_cent_has_a_nearest():
-    with pytest.raises(Refusal) as refused:
-        target_of({"target": {"edge_max": 6}})
-    assert (refused.value.field, refused.value.nearest) == (FIELD, 0.06)
 
 
 def test_an_unknown_key_points_at_the_targets_schema(tmp_path):

@@ -7,6 +7,9 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import patch
+
+from tests.in_process import unitcad
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -52,9 +55,7 @@ def run_console(page, folder):
     A command that ends in "# exit 2" must exit with 2, others with 0; "# not run: REASON" is left out. Lines below a
     command are its output; if there are none, the output is not compared.
     """
-    here, count = Path(sys.executable).parent, 0
-    environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
-    parts = []
+    parts, count = [], 0
     for language, text in BLOCK.findall(page.read_text("utf-8")):
         parts += re.split(r"(?m)^\$ ", text)[1:] if language == "console" else []
         if text.startswith(FILE):
@@ -64,17 +65,22 @@ def run_console(page, folder):
         if "# not run: " in line:
             continue
         command, _, code = line.partition("# exit ")
-        words = shlex.split(command, comments=True)
-        words[0] = sys.executable if words[0] == "python" else shutil.which(words[0], path=str(here)) or words[0]
-        done = subprocess.run(
-            words, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            timeout=600, check=False,
-        )  # fmt: skip
-        where = f"{page.name}: {line}\n{done.stdout}"
+        done = run(shlex.split(command, comments=True), folder)
+        output = done.stderr + done.stdout
+        where = f"{page.name}: {line}\n{output}"
         assert done.returncode == int(code or 0), where
-        assert "Traceback" not in done.stdout, where
+        assert "Traceback" not in output, where
         if shown:
-            lost = missing([text.rstrip() for text in shown], [text.rstrip() for text in done.stdout.splitlines()])
+            lost = missing([text.rstrip() for text in shown], [text.rstrip() for text in output.splitlines()])
             assert lost is None, f"not in the output: {lost!r}\n{where}"
         count += 1
     return count
+
+
+def run(words, folder):
+    """Run a command in a folder: unitcad's own ones in this process."""
+    with patch.dict(os.environ, COLUMNS="100", NO_COLOR="1"):
+        if words[0] == "unitcad":
+            return unitcad(*words[1:], cwd=folder)
+        words[0] = shutil.which(words[0], path=Path(sys.executable).parent) or words[0]
+        return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=600, check=False)

@@ -3,8 +3,6 @@
 import doctest
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +11,7 @@ import pytest
 from page_examples import BLOCK, ROOT, blocks, missing, pages, run_console
 
 from docs.generated import pages as generated_pages
+from tests.in_process import unitcad
 from unitcad.arrays.array_file import load_array
 from unitcad.validation import from_data
 
@@ -118,10 +117,8 @@ def test_console_examples_run(page, tmp_path):
 
 def test_the_readme_shows_the_output_of_its_first_command(tmp_path):
     """The text block, and nothing before or between its lines; the folder follows."""
-    command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "-o", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
     [shown] = blocks(ROOT / "README.md", "text")
-    assert done.stderr.startswith(shown)
+    assert unitcad("build", "encapsulating", "-o", tmp_path).stderr.startswith(shown)
 
 
 LINK = re.compile(r"\]\(([^)\s#]*)(?:#([^)\s]+))?\)")

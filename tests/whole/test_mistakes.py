@@ -1,11 +1,10 @@
 """Usual mistakes at the command line: each answer names file and line, field, value, limit and a value that works."""
 
 import shlex
-import sys
 
 import pytest
 
-from unitcad import cli
+from tests.in_process import unitcad
 from unitcad.validation.load import shipped_files
 
 UNIT = 'name = "unit"\ndesign = "encapsulating"\ndiameter_mm = 14\n'
@@ -17,7 +16,6 @@ THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; ne
 
 COMMANDS = {
     "biuld unit.toml": "COMMAND = 'biuld': unknown name; closest: build; nearest accepted: 'build'",
-    "version": "COMMAND = 'version': unknown name; closest: --version, design; nearest accepted: '--version'",
     "build unit.toml --jobs 4": "--jobs: unknown option; unitcad batch and unitcad check take it",
     "build unit.toml --set diameter_mm 14": "--set = 'diameter_mm': needs the form path=value in one word, such as "
     "layers.0.wall_mm=1.0",
@@ -30,7 +28,6 @@ COMMANDS = {
     "build Embedded": "SPEC = 'Embedded': unknown name; closest: embedded, single-embedded; "
     "nearest accepted: 'embedded'",
     "build folder": "SPEC = 'folder': is a folder; name a TOML file in it",
-    "build ./folder": "SPEC = './folder': is a folder; name a TOML file in it",
     "estimate made": "SPEC = 'made': is a folder; name a TOML file in it; nearest accepted: 'made/spec.toml'",
     "build ./part.step": "SPEC = './part.step': is a body: write design = \"./part.step\" in a spec",
     "build README.md": "README.md: no such file",
@@ -60,6 +57,7 @@ COMMANDS = {
     "[1, 1]; nearest accepted: [2, 5]",
     "build forearm-patch --set layout.pitch_mm=x": "layout.pitch_mm = 'x': takes a number or a list such as [1.5, 1.5]",
     "batch unit.toml": "SWEEP = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "batch a b": "SWEEP = 'b': a batch takes one sweep; run a second batch for this one",
     "batch sweep.toml --formats stl step": "SWEEP = 'step': is a format; several take commas: --formats stl,step",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
     "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",
@@ -79,10 +77,10 @@ COMMANDS = {
     "check part.csv --report sarif": "--report = 'sarif': must be FORMAT=FILE; nearest accepted: 'sarif=report.sarif'",
     "material curve.csv": "--like: is required: 'curve' is no shipped silicone, and a curve gives only a modulus; "
     "known: " + SILICONES,
+    "material part.csv --width-mm nan": "--width-mm: nan is not a finite number; see unitcad material --help",
     "material part.csv": "part.csv: needs two lines or more of the same count of numbers",
     "material unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
     "measure part.csv": "CAMPAIGN = 'part.csv': is not a TOML file, whose name ends in .toml",
-    "measure gone": "gone: no such file",
     "measure unit.toml": "CAMPAIGN = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit unit.toml": "LAB = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit nowhere": "LAB = 'nowhere': unknown name; known: synthetic-bench",
@@ -93,7 +91,6 @@ COMMANDS = {
     "estimate thickness": "SPEC = 'thickness': is a sweep: run unitcad batch thickness",
     "batch forearm-patch": "SWEEP = 'forearm-patch': is an array: run unitcad build forearm-patch",
     "design sweep": "TARGET = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
-    "phantom unit": "PHANTOM = 'unit.toml': is a spec: run unitcad build unit.toml",
     "design quiet": "TARGET = 'quiet': unknown name; closest: quiet-edge; nearest accepted: 'quiet-edge'",
     "list motor": "KIND = 'motor': unknown name; closest: motors; nearest accepted: 'motors'",
     "schema sweeps": "KIND = 'sweeps': unknown name; closest: sweep; nearest accepted: 'sweep'",
@@ -160,17 +157,14 @@ FILES = {
 }
 
 
-def answer(words, capsys, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["unitcad", *words])
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
-    assert ended.value.code == 2
-    return [line.removeprefix("error: ") for line in capsys.readouterr().err.splitlines()]
+def answer(words, folder):
+    done = unitcad(*words, cwd=folder)
+    assert done.returncode == 2
+    return [line.removeprefix("error: ") for line in done.stderr.splitlines()]
 
 
 @pytest.mark.parametrize("line", COMMANDS)
-def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path):
     for folder in ("folder", "made"):
         (tmp_path / folder).mkdir()
     files = {
@@ -186,11 +180,10 @@ def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path, capsys, 
     (tmp_path / "binary.toml").write_bytes(b"\xff\x00\x80")
     (tmp_path / "sweep.toml").write_text(shipped_files("sweeps")["thickness"].read_text())
     (tmp_path / "target.toml").write_text(shipped_files("targets")["quiet-edge"].read_text())
-    assert answer(shlex.split(line), capsys, monkeypatch) == [COMMANDS[line]]
+    assert answer(shlex.split(line), tmp_path) == [COMMANDS[line]]
 
 
 @pytest.mark.parametrize(("command", "text"), FILES)
-def test_every_mistake_in_a_file_is_told_with_its_line(command, text, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_every_mistake_in_a_file_is_told_with_its_line(command, text, tmp_path):
     (tmp_path / "a.toml").write_text(text)
-    assert answer([command, "a.toml"], capsys, monkeypatch) == [f"a.toml:{line}" for line in FILES[command, text]]
+    assert answer([command, "a.toml"], tmp_path) == [f"a.toml:{line}" for line in FILES[command, text]]

@@ -1,7 +1,5 @@
 """The pages of the reference that are made from the package: nothing that the package knows is left out."""
 
-from __future__ import annotations
-
 import re
 import typing
 
