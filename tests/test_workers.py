@@ -334,7 +334,7 @@ def _storm(seed, count):
 
 @posix
 def test_no_call_is_lost_under_random_kills_and_stops():
-    _storm(seed=11, count=80)
+    _storm(seed=11, count=40)
 
 
 @posix

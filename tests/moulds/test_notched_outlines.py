@@ -82,8 +82,14 @@ def upright_surface(solid):
     return 2 * float(solid.project().area()) + walls
 
 
-@pytest.mark.parametrize(("lift", "angle"), [(0.2, 0.0), (0.0, 23.0), (0.2, 200.0)])
-@pytest.mark.parametrize("outline", OUTLINES)
+@pytest.mark.parametrize(
+    ("outline", "lift", "angle"),
+    [
+        pytest.param(outline, lift, angle, marks=[] if (i + k) % 3 == 0 else [pytest.mark.long])
+        for i, outline in enumerate(OUTLINES)
+        for k, (lift, angle) in enumerate([(0.2, 0.0), (0.0, 23.0), (0.2, 200.0)])
+    ],
+)
 def test_a_notch_keeps_every_check(outline, lift, angle, tmp_path):
     moulds = of_spec(load(written(tmp_path, outline, lift, angle)))
     assert broken(moulds) == set()
