@@ -7,8 +7,9 @@ surface. In a mesh file a pocket of coarse facets for a bought part passes with 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from manifold3d import Manifold
@@ -17,7 +18,7 @@ from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape import Shape, union
+from unitcad.shape import Shape
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.text import number
 
@@ -32,28 +33,13 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
     The cells of a layer are compared with each other, then count as one solid.
     """
-    return moulds.once("C200", lambda: _of_all(moulds))
+    return moulds.once("C200", lambda: [*of_unit(moulds), *_of_pours(moulds)])
 
 
-def _of_all(moulds: MouldSet) -> list[MouldFinding]:
-    volumes = _Volumes(moulds.facets)
-    pours = [*_of_pours(moulds, volumes)]
-    return [*of_unit(moulds, _of_layers(moulds, volumes)), *pours]
-
-
-def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], float]:
-    """Return the shared volumes of the unit's layers by name, if the last pour has them at the same places."""
-    last = moulds.plan.steps[-1]
-    cast = [*_earlier(moulds, last), (last.name, last.layer)]
-    bodies = {name: body.name for name, shapes in cast for body in moulds.unit if body.shape == union(shapes)}
-    known = volumes.of_names.items()
-    return {(bodies[a], bodies[b]): volume for (a, b), volume in known if a in bodies and b in bodies}
-
-
-def of_unit(moulds: MouldSet, known: Mapping[tuple[str, str], float] | None = None) -> list[MouldFinding]:
-    """Look at the unit, or the patch, alone; `known` has volumes that pairs share, by their names."""
+def of_unit(moulds: MouldSet) -> list[MouldFinding]:
+    """Look at the unit, or the patch, alone."""
     there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
-    found = _findings("unit", there, _Volumes(moulds.facets, known))
+    found = _findings("unit", there, moulds.facets, {})
     return [finding if finding.ok else _explained(moulds, finding) for finding in found]
 
 
@@ -83,15 +69,16 @@ _There = Sequence[tuple[str, Sequence[Manifold]]]
 """The pieces of a pour by name: a layer has a part in every cell."""
 
 
-def _of_pours(moulds: MouldSet, volumes: _Volumes) -> Iterator[MouldFinding]:
+def _of_pours(moulds: MouldSet) -> Iterator[MouldFinding]:
+    known: dict[tuple[str, str], float] = {}  # a pair that several pours have in common is cut once
     for step in moulds.plan.steps:
         cells = moulds.meshes(step.layer)
         alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
-        yield from _findings(f"pour {step.index}", alone, volumes)
         cast = [*((name, moulds.meshes(shapes)) for name, shapes in _earlier(moulds, step)), (step.name, cells)]
         laid = [(body.name, [moulds.mesh(body)]) for body in step.inserts]
         tools = [(name, [moulds.pressed[name]]) for name in step.tools]
-        yield from _findings(f"pour {step.index}", [*tools, *cast, *laid], volumes)
+        for there in (alone, [*tools, *cast, *laid]):
+            yield from _findings(f"pour {step.index}", there, moulds.facets, known)
 
 
 def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, ...]]]:
@@ -103,14 +90,17 @@ def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, .
         yield before.name if there == before.layer else f"{before.name} laid in", there
 
 
-def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding]:
-    """Return the pair that shares most, and every pair that shares too much."""
+def _findings(where: str, there: _There, facets: float, known: dict[tuple[str, str], float]) -> list[MouldFinding]:
+    """Return the pair that shares most, and every pair that shares too much; note each pair's volume, mm3."""
     pairs = []
-    boxes = np.array([volumes.box(parts) for _, parts in there]).reshape(-1, 6)
-    for i, k in np.argwhere(np.triu(_meet(boxes, boxes), 1)):
-        volume = volumes.shared(there[i], there[k])
-        if volume is not None:
-            pairs.append(at_most("C200", f"{where}: {there[i][0]} and {there[k][0]}", volume, OVERLAP, "mm3"))
+    boxes = [np.array([solid.bounding_box() for solid in parts]) for _, parts in there]
+    for ((a, parts), own), ((b, others), beside) in combinations(zip(there, boxes, strict=True), 2):
+        meeting = np.argwhere(_meet(own, beside))
+        if not len(meeting):
+            continue
+        if (a, b) not in known:
+            known[a, b] = sum(common_volume(others[k], parts[i], facets) for i, k in meeting)
+        pairs.append(at_most("C200", f"{where}: {a} and {b}", known[a, b], OVERLAP, "mm3"))
     return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
 
 
@@ -128,41 +118,6 @@ def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
         opinions = (thick_pieces(solid, facets) for solid in (shared, one ^ other))
         return min(sum(float(piece.volume()) for piece in pieces) for pieces in opinions)
     return min(volume, float((one ^ other).volume()), float(one.volume() - (one - other).volume()))
-
-
-class _Volumes:
-    """The volumes that pairs share: a pair that several pours have in common is cut once.
-
-    `known` and `of_names` have volumes by names; films up to `facets` thick, mm, are left out.
-    """
-
-    def __init__(self, facets: float, known: Mapping[tuple[str, str], float] | None = None) -> None:
-        self.facets = facets
-        self.of_names = dict(known or {})
-        self._boxes: dict[int, tuple[float, ...]] = {}
-        self._kept: list[Manifold] = []
-
-    def shared(self, one: tuple[str, Sequence[Manifold]], other: tuple[str, Sequence[Manifold]]) -> float | None:
-        """Return the volume that two named pieces share, mm3; None if none of their boxes meet."""
-        (a, parts), (b, others) = one, other
-        boxes, beside = (np.array([self._box(part) for part in each]) for each in (parts, others))
-        meeting = np.argwhere(_meet(boxes, beside))
-        if not len(meeting):
-            return None
-        if (a, b) not in self.of_names:
-            self.of_names[a, b] = sum(common_volume(others[k], parts[i], self.facets) for i, k in meeting)
-        return self.of_names[a, b]
-
-    def box(self, parts: Sequence[Manifold]) -> np.ndarray:
-        """Return the box round several solids: its low corner, then the high one, mm."""
-        boxes = np.array([self._box(part) for part in parts])
-        return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
-
-    def _box(self, solid: Manifold) -> tuple[float, ...]:
-        if id(solid) not in self._boxes:
-            self._boxes[id(solid)] = solid.bounding_box()
-            self._kept.append(solid)  # or its identity could become another's
-        return self._boxes[id(solid)]
 
 
 def _meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
