@@ -40,6 +40,10 @@ def test_the_rows_of_a_patch_are_alike():
     assert [cells[0].index(number) for number in cells[0]] == [0, 1, 2] * 3
 
 
+def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_their_own():
+    assert [len(each.steps) for each in made("sleeve-curved").surroundings] == [1, 1]
+
+
 # Units stand at -10 and 10 along x and y: bores of 5.75, cores of 4.6, 2.11 high.
 FAULTS = {
     "a lump in a bore": ("C100", "cup1", more(box(9.6, 10.4, -4.5, -4, 1, 2))),
