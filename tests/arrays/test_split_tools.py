@@ -9,7 +9,8 @@ from tests.arrays.made_arrays import made
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import mould_checks
-from unitcad.moulds.cuts import split, straight
+from unitcad.errors import Refusal
+from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams, split, straight
 from unitcad.pipeline.plan import file_stem
 from unitcad.shape import Common, box, cut, moved, union
 
@@ -79,6 +80,26 @@ def test_too_many_seams_weep_too_much():
     faulty = replace(plan, splits=(*plan.splits[:-1], many))
     found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if "silicone" in f.where]
     assert [f.ok for f in found] == [True, False]
+
+
+def cut_at(bed):
+    """Cut a tool 220 mm long, a feature 12 mm wide every 20 mm."""
+    corners = ((-6.0, -30), (6.0, -30), (6.0, 30), (-6.0, 30))
+    features = tuple(Feature(tuple((x + dx, y) for dx, y in corners)) for x in range(-100, 101, 20))
+    sized = Sized("x", (-110, 110), bed, (-30, 30), features, (tuple(in_gaps((-110, 110), features)),))
+    return [seam.at for seam in seams([sized], "it", 0.15)]
+
+
+def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least():
+    for bed, count in ((250, 0), (120, 2), (80, 3), (50, 5)):
+        where = cut_at(bed)
+        assert len(where) == count
+        assert all(abs((x - 10) % 20) < 1e-9 for x in where)
+    with pytest.raises(Refusal) as refused:
+        cut_at(20)
+    assert cut_at(refused.value.nearest)
+    with pytest.raises(Refusal):
+        cut_at(refused.value.nearest - 0.2)
 
 
 def test_the_procedure_joins_and_seals_before_the_first_pour():
