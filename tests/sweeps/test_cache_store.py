@@ -232,14 +232,14 @@ def _replaced(path, kind, outside):
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("what", ["content", "entry"])
-@pytest.mark.parametrize("running", [True, False], ids=["running", "anew"])
-def test_damage_is_found_and_mended(kind, what, running, tmp_path):
+@pytest.mark.parametrize("anew", [False, True], ids=["", "anew"])
+def test_damage_is_found_and_mended(kind, what, anew, tmp_path):
     root, make = tmp_path / "c", Made()
     store = DiskStore(root)
     sha = store.file("ab1", make)
     path = root / "content" / sha[:2] / sha if what == "content" else root / "files" / "ab" / "ab1"
     _replaced(path, kind, tmp_path / "outside")
-    if not running:
+    if anew:
         store = DiskStore(root)
     assert store.file("ab1", make) == sha
     assert make.count == 2
