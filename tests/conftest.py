@@ -27,13 +27,13 @@ def pytest_collection_modifyitems(config, items):
         cases = groupby(items, lambda item: item.nodeid.partition("[")[0])
         items[:] = [item for _, group in cases for item in islice(group, most)]
     for item in items:
-        slow = "running" in item.fixturenames or item.get_closest_marker("slicer")
+        slow = "browser" in item.fixturenames or item.get_closest_marker("slicer")
         if slow and not item.get_closest_marker("smoke"):
             item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session")
-def running():
+def browser():
     """Chromium. Its absence is a failure in CI and a reason to skip elsewhere."""
     import chromium
 

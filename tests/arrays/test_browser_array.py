@@ -19,9 +19,9 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def visit(running, folder):
+def visit(browser, folder):
     page = write_report(folder)
-    seen = Visit(running, page)
+    seen = Visit(browser, page)
     seen.drawn()
     yield seen
     assert seen.errors == []

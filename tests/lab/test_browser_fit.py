@@ -24,8 +24,8 @@ def fit_page(fitted, tmp_path_factory):
 
 
 @pytest.fixture
-def visit(running, fit_page):
-    seen = Visit(running, fit_page)
+def visit(browser, fit_page):
+    seen = Visit(browser, fit_page)
     seen.page.get_by_text("How sure?").click()
     yield seen
     assert seen.errors == []
@@ -57,7 +57,7 @@ def test_range_measurement_and_name_of_the_fit_are_there(visit, fitted):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_overflows_at_390_pixels(running, fit_page, dark):
-    seen = Visit(running, fit_page, width=390, height=844, dark=dark)
+def test_nothing_overflows_at_390_pixels(browser, fit_page, dark):
+    seen = Visit(browser, fit_page, width=390, height=844, dark=dark)
     assert seen.overflowing() == []
     seen.close()

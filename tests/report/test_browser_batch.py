@@ -7,8 +7,8 @@ from pagetable import column, table_page
 
 
 @pytest.fixture
-def visit(running, sweep):
-    seen = Visit(running, sweep / "report.html")
+def visit(browser, sweep):
+    seen = Visit(browser, sweep / "report.html")
     yield seen
     assert {url.partition("#")[0] for url in seen.requests} == {(sweep / "report.html").resolve().as_uri()}
     seen.close()
@@ -92,15 +92,15 @@ def test_to_a_variant_and_back_by_keys(visit):
     assert visit.page.inner_text("h1") == "c 1.25"
 
 
-def test_nothing_overflows_at_390_pixels(running, sweep):
-    seen = Visit(running, sweep / "report.html", width=390, height=844)
+def test_nothing_overflows_at_390_pixels(browser, sweep):
+    seen = Visit(browser, sweep / "report.html", width=390, height=844)
     assert seen.overflowing() == []
     seen.close()
 
 
-def test_two_thousand_rows_come_in_pages(running, tmp_path):
+def test_two_thousand_rows_come_in_pages(browser, tmp_path):
     rows = [["", f"v{i}", i * 7 % 2000, f"group {i % 3}", None] for i in range(2000)]
-    seen = Visit(running, table_page(tmp_path, ["name", "value", "group", "empty"], rows))
+    seen = Visit(browser, table_page(tmp_path, ["name", "value", "group", "empty"], rows))
     assert len(column(seen, "name")) == 100
     head(seen, "value").click()
     assert column(seen, "value") == [str(i) for i in range(100)]
@@ -115,9 +115,9 @@ def test_two_thousand_rows_come_in_pages(running, tmp_path):
 
 
 @pytest.mark.parametrize(("folder", "word"), [("many", "many"), ("Ann's rings", "'Ann'\\''s rings'")])
-def test_a_row_without_a_folder_says_how_to_make_it(running, tmp_path, folder, word):
+def test_a_row_without_a_folder_says_how_to_make_it(browser, tmp_path, folder, word):
     page = table_page(tmp_path, ["name"], [["ring-0123456789ab", "ring"], ["", "failed"]], stored_in=folder)
-    visit = Visit(running, page)
+    visit = Visit(browser, page)
     note = visit.page.locator(".lacking")
     assert note.inner_text() == ""
     visit.page.click(".variants tbody a")

@@ -34,8 +34,8 @@ def page_of_one(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_a_printed_sheet_fits_two_pages(name, running, tmp_path):
-    visit = Visit(running, bench(name, SETS[name], tmp_path))
+def test_a_printed_sheet_fits_two_pages(name, browser, tmp_path):
+    visit = Visit(browser, bench(name, SETS[name], tmp_path))
     pdf = visit.page.pdf(prefer_css_page_size=True)
     visit.page.emulate_media(media="print")
     least = visit.page.evaluate(
@@ -49,9 +49,9 @@ def test_a_printed_sheet_fits_two_pages(name, running, tmp_path):
     assert 1 <= len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 2
 
 
-def test_on_paper_no_text_stands_beside_a_picture(running, page_of_one):
+def test_on_paper_no_text_stands_beside_a_picture(browser, page_of_one):
     """Every line of a step has the width of its column, 60 mm: some forty letters of 8 pt."""
-    visit = Visit(running, page_of_one)
+    visit = Visit(browser, page_of_one)
     visit.page.emulate_media(media="print")
     widths = visit.page.evaluate(
         """() => [...document.querySelectorAll("li.bench-step")].map((step) => {
@@ -68,9 +68,9 @@ def test_on_paper_no_text_stands_beside_a_picture(running, page_of_one):
     visit.close()
 
 
-def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(running, page_of_one):
+def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(browser, page_of_one):
     """1.40 g of A at 1 to 1 ask for 1.40 g of B; a motor of 2.3 mm asks for other moulds, one of 2.03 does not."""
-    visit = Visit(running, page_of_one)
+    visit = Visit(browser, page_of_one)
     page, code = visit.page, visit.page.locator("#first code")
     asked = code.inner_text()
     assert asked == (
@@ -91,8 +91,8 @@ def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(runn
     visit.close()
 
 
-def test_the_sheet_has_what_goes_wrong(running, page_of_one):
-    visit = Visit(running, page_of_one)
+def test_the_sheet_has_what_goes_wrong(browser, page_of_one):
+    visit = Visit(browser, page_of_one)
     rows = visit.page.locator("#troubles tbody tr").count()
     said = (page_of_one.parent / "troubleshooting.md").read_text("utf-8")
     assert rows == said.count("\n## ") == len(json.loads((page_of_one.parent / "casting.json").read_text())["troubles"])
@@ -100,8 +100,8 @@ def test_the_sheet_has_what_goes_wrong(running, page_of_one):
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, False)])
-def test_it_contacts_nothing_and_fits_its_window(width, dark, running, page_of_one):
-    visit = Visit(running, page_of_one, width=width, dark=dark)
+def test_it_contacts_nothing_and_fits_its_window(width, dark, browser, page_of_one):
+    visit = Visit(browser, page_of_one, width=width, dark=dark)
     assert {url.partition(":")[0] for url in visit.requests} <= {"file", "data"}
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
     assert visit.page.locator("#assembly h2").inner_text() == "Motor in"
@@ -118,8 +118,8 @@ def test_it_contacts_nothing_and_fits_its_window(width, dark, running, page_of_o
     visit.close()
 
 
-def test_a_timer_goes_on_through_a_reload(running, page_of_one):
-    visit = Visit(running, page_of_one)
+def test_a_timer_goes_on_through_a_reload(browser, page_of_one):
+    visit = Visit(browser, page_of_one)
     page = visit.page
     page.get_by_role("button", name="Start pot life").first.click()
     began = page.evaluate("Object.values(JSON.parse(Object.values(localStorage)[0]).began)[0]")
@@ -139,9 +139,9 @@ def test_a_timer_goes_on_through_a_reload(running, page_of_one):
     visit.close()
 
 
-def test_the_schedule_counts_back(running, page_of_one):
+def test_the_schedule_counts_back(browser, page_of_one):
     casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
-    visit = Visit(running, page_of_one)
+    visit = Visit(browser, page_of_one)
     visit.page.locator("[name=ready]").fill("2101-03-14T12:00")
     visit.page.locator("[name=ready]").dispatch_event("change")
     begin = visit.page.locator("#plan .verdict").inner_text()
@@ -154,8 +154,8 @@ def test_the_schedule_counts_back(running, page_of_one):
 
 
 @pytest.mark.smoke
-def test_the_record_is_saved_and_shown(running, page_of_one):
-    visit = Visit(running, page_of_one)
+def test_the_record_is_saved_and_shown(browser, page_of_one):
+    visit = Visit(browser, page_of_one)
     page, folder = visit.page, page_of_one.parent
     for name, text in {"p1.a": "1,02", "p1.b": "0.99", "u1.height": "4.6", "u1.w2.1": "1.3", "u1.w2.3": "1.2"}.items():
         page.locator(f'[name="{name}"]').fill(text)
@@ -189,7 +189,7 @@ def test_the_record_is_saved_and_shown(running, page_of_one):
     unit = record.unit(1)
     assert unit is not None
     assert (unit.height_mm, unit.mass_g, unit.wall_mm(1), unit.wall_mm(2)) == (4.6, 0.61, (), (1.3, 1.2))
-    shown = Visit(running, write_report(folder))
+    shown = Visit(browser, write_report(folder))
     text = shown.page.locator("#casts").inner_text()
     shown.close()
     assert all(words in text for words in (record.cast_on, "1.02", "0.61", "2: 1.3, 1.2", "warm room"))

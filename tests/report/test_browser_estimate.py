@@ -37,8 +37,8 @@ def estimate(solved):
 
 
 @pytest.fixture
-def visit(running, solved):
-    seen = Visit(running, solved / "report.html")
+def visit(browser, solved):
+    seen = Visit(browser, solved / "report.html")
     seen.page.evaluate(OPEN)
     yield seen
     seen.close()
@@ -71,8 +71,8 @@ def test_both_drives_are_drawn_and_stand_in_the_table(visit, estimate):
     assert ratio[-1] > 100  # far out a sideways force moves more skin
 
 
-def test_two_lines_lead_and_the_rest_is_folded(running, solved, estimate):
-    seen = Visit(running, solved / "report.html")
+def test_two_lines_lead_and_the_rest_is_folded(browser, solved, estimate):
+    seen = Visit(browser, solved / "report.html")
     answer, shown = estimate["answer"], seen.page.inner_text("#estimate")
     for line in (answer["headline"], answer["lines"][1], answer["lines"][0][len(answer["headline"]) :].strip()):
         assert line in shown
@@ -141,8 +141,8 @@ def test_the_inputs_that_a_model_sees(visit, estimate):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_of_it_is_wider_than_its_column(running, solved, dark):
-    seen = Visit(running, solved / "report.html", width=390, height=844, dark=dark)
+def test_nothing_of_it_is_wider_than_its_column(browser, solved, dark):
+    seen = Visit(browser, solved / "report.html", width=390, height=844, dark=dark)
     seen.page.evaluate(OPEN)
     for width in (768, 1280, 1920, 390):
         seen.page.set_viewport_size({"width": width, "height": 844})

@@ -87,11 +87,11 @@ def test_a_filter_not_understood_says_so(table_of_both, field, text):
 
 
 @pytest.fixture(scope="module")
-def both(running, tmp_path_factory):
+def both(browser, tmp_path_factory):
     """A column of numbers, one of numbers and texts, one of texts."""
     rows = [["", f"v{i}", value, "auto", "soft" if i % 2 else "hard"] for i, value in enumerate(NUMBERS)]
     rows[0][3], rows[1][3], rows[2][4] = 1, "1.0 soft", "a <x> b"
-    seen = Visit(running, table_page(tmp_path_factory.mktemp("both"), ["name", "value", "mixed", "word"], rows))
+    seen = Visit(browser, table_page(tmp_path_factory.mktemp("both"), ["name", "value", "mixed", "word"], rows))
     yield seen
     seen.close()
 

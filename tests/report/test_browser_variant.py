@@ -16,8 +16,8 @@ from unitcad.validation import load, templates
 
 
 @pytest.fixture
-def visit(running, page):
-    seen = Visit(running, page, script=LISTEN)
+def visit(browser, page):
+    seen = Visit(browser, page, script=LISTEN)
     seen.drawn()
     yield seen
     assert seen.requests == [page.resolve().as_uri()]
@@ -190,8 +190,8 @@ def test_the_estimate_shows_models_and_the_measured_value(visit):
     assert (np.abs(image - visit.colour("series-1")).max(axis=2) < 30).sum() > 150
 
 
-def test_drawings_are_whole_at_390_pixels_and_large_on_demand(running, page):
-    seen = Visit(running, page, width=390, height=844)
+def test_drawings_are_whole_at_390_pixels_and_large_on_demand(browser, page):
+    seen = Visit(browser, page, width=390, height=844)
     drawings = seen.page.locator("img.drawing").all()
     assert len(drawings) == 3
     for image in drawings:
@@ -209,14 +209,14 @@ def test_drawings_are_whole_at_390_pixels_and_large_on_demand(running, page):
         button.press("Enter")
         assert image.bounding_box()["width"] == box["width"]
     seen.close()
-    wide = Visit(running, page)
+    wide = Visit(browser, page)
     assert not wide.page.locator(".enlarge").first.is_visible()
     wide.close()
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_overflows_at_390_pixels(running, page, dark):
-    seen = Visit(running, page, width=390, height=844, dark=dark)
+def test_nothing_overflows_at_390_pixels(browser, page, dark):
+    seen = Visit(browser, page, width=390, height=844, dark=dark)
     seen.drawn()
     assert drawn_share(canvas(seen)) > 0.05
     for summary in seen.page.locator("summary").all():
@@ -225,13 +225,13 @@ def test_nothing_overflows_at_390_pixels(running, page, dark):
     seen.close()
 
 
-def test_light_and_dark(running, page):
+def test_light_and_dark(browser, page):
     def background(visit):
         text = visit.page.evaluate("() => getComputedStyle(document.body).backgroundColor")
         return [int(part) for part in text.removeprefix("rgb(").removesuffix(")").split(",")]
 
     for dark in (False, True):
-        seen = Visit(running, page, dark=dark)
+        seen = Visit(browser, page, dark=dark)
         assert (max(background(seen)) < 60) == dark
         seen.page.click('button[aria-label="Switch between light and dark"]')
         assert (max(background(seen)) < 60) != dark
@@ -269,8 +269,8 @@ def test_print_shows_the_procedure_and_not_the_controls(visit):
         assert not visit.page.locator(selector).first.is_visible(), selector
 
 
-def test_without_webgl_the_drawing_stands_in(running, page):
-    with launched(running.browser_type, "--disable-3d-apis") as blind:
+def test_without_webgl_the_drawing_stands_in(browser, page):
+    with launched(browser.browser_type, "--disable-3d-apis") as blind:
         seen = Visit(blind, page)
         seen.page.wait_for_selector(".stage-host .absent")
         assert "no 3D" in seen.page.inner_text(".stage-host")
@@ -279,9 +279,9 @@ def test_without_webgl_the_drawing_stands_in(running, page):
         seen.close()
 
 
-def test_what_is_absent_says_what_to_ask_for(running, tmp_path):
+def test_what_is_absent_says_what_to_ask_for(browser, tmp_path):
     folder = build(load("embedded", ["output.formats=[]"]), tmp_path, only=["moulds"], check=False).folder
-    seen = Visit(running, write_report(folder))
+    seen = Visit(browser, write_report(folder))
     seen.drawn()
     for where, ask in (
         ("estimate", "estimate"),
@@ -294,10 +294,10 @@ def test_what_is_absent_says_what_to_ask_for(running, tmp_path):
 
 
 @pytest.mark.parametrize("only", [["unit"], ["unit", "estimate"]])
-def test_a_design_without_an_estimate_says_why(running, only, tmp_path):
+def test_a_design_without_an_estimate_says_why(browser, only, tmp_path):
     """Whether or not it was asked for: the command that asks for it would be refused."""
     spec = load(next(iter(templates().values())).parent / "custom" / "dome.toml", ["output.formats=[]"])
-    seen = Visit(running, write_report(build(spec, tmp_path, only=only).folder))
+    seen = Visit(browser, write_report(build(spec, tmp_path, only=only).folder))
     seen.page.wait_for_selector("#estimate .absent", timeout=10_000)
     shown = seen.page.inner_text("#estimate")
     assert "No estimate: the models describe" in shown

@@ -201,11 +201,11 @@ def test_a_bodys_name_is_text_in_meshes_and_drawings(name):
 
 
 @pytest.mark.smoke
-def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders, running):
+def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders, browser):
     root = next(iter(folders.values())).parent
     page = write_report(root)
     for name in ["", *SHOWN[:4]]:
-        visit = chromium.Visit(running, page, fragment=folders[name].name if name else "")
+        visit = chromium.Visit(browser, page, fragment=folders[name].name if name else "")
         visit.page.on("dialog", lambda dialog, errors=visit.errors: errors.append(dialog.message))
         visit.page.wait_for_timeout(100)
         asked = [url.partition("#")[0] for url in visit.requests if not url.startswith(("data:", "blob:"))]

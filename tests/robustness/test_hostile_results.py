@@ -117,20 +117,20 @@ def test_a_damaged_variant_of_a_batch_is_named_in_its_table(good, tmp_path):
     ]
 
 
-def test_in_a_browser_no_script_runs_and_nothing_is_asked_for(good, tmp_path, running):
+def test_in_a_browser_no_script_runs_and_nothing_is_asked_for(good, tmp_path, browser):
     root = _spoilt(good, tmp_path, [*SHOWN_IN_BROWSER, "manifest.json is torn"])
     page = write_report(root)
-    _visited(running, page, "")
+    _visited(browser, page, "")
     for kind in SHOWN_IN_BROWSER:
-        text = _visited(running, page, re.sub(r"\W+", "-", kind))
+        text = _visited(browser, page, re.sub(r"\W+", "-", kind))
         assert "Files" in text
     folder = root / re.sub(r"\W+", "-", "drawings hold scripts")
-    _visited(running, write_report(folder), "")
+    _visited(browser, write_report(folder), "")
 
 
-def _visited(running, page, fragment):
+def _visited(browser, page, fragment):
     """The page's text, when it has asked for nothing but itself and run nothing but its own."""
-    visit = chromium.Visit(running, page, fragment=fragment)
+    visit = chromium.Visit(browser, page, fragment=fragment)
     try:
         visit.page.on("dialog", lambda dialog: visit.errors.append(f"dialog: {dialog.message}"))
         visit.page.wait_for_timeout(300)

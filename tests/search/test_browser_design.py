@@ -15,8 +15,8 @@ def design_html(tmp_path_factory):
 
 
 @pytest.mark.smoke
-def test_heads_stand_over_their_columns_and_on_a_phone_beside_their_values(running, design_html):
-    page = running.new_page(viewport={"width": 1200, "height": 900})
+def test_heads_stand_over_their_columns_and_on_a_phone_beside_their_values(browser, design_html):
+    page = browser.new_page(viewport={"width": 1200, "height": 900})
     page.goto(design_html.as_uri())
     ends = "nodes => nodes.map(node => Math.round(node.getBoundingClientRect().right))"
     heads = page.eval_on_selector_all('.scroll[aria-label="proposals"] th', ends)

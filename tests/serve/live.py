@@ -10,8 +10,8 @@ WALL = 'input[name="layers.0.wall_mm"]'
 class Live(Visit):
     """A page of a server in a browser."""
 
-    def __init__(self, running, server, width=1280, height=900, dark=False):
-        super().__init__(running, server.url, width, height, dark)
+    def __init__(self, browser, server, width=1280, height=900, dark=False):
+        super().__init__(browser, server.url, width, height, dark)
         self.server = server
         self.settled()
 

@@ -33,8 +33,8 @@ CAMPAIGN = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
 
 @pytest.fixture(scope="module")
 def pockets(tmp_path_factory):
-    with serving(tmp_path_factory.mktemp("array"), "forearm-pockets") as running:
-        yield running
+    with serving(tmp_path_factory.mktemp("array"), "forearm-pockets") as server:
+        yield server
 
 
 def test_answers_are_those_of_the_commands(pockets):
@@ -137,8 +137,8 @@ def test_a_file_that_the_server_s_own_array_names_is_read(tmp_path):
 
 
 @pytest.mark.smoke
-def test_a_patch_is_shown_and_changed(running, pockets):
-    live = Live(running, pockets)
+def test_a_patch_is_shown_and_changed(browser, pockets):
+    live = Live(browser, pockets)
     assert "mould checks passed" in live.state
     assert live.page.inner_text("h1") == "forearm-pockets"
     assert "sheet" in live.page.get_attribute(".stage-host", "data-shown")
@@ -178,11 +178,11 @@ def test_a_patch_is_shown_and_changed(running, pockets):
     live.close()
 
 
-def test_a_campaign_is_measured_again_after_a_save(running, tmp_path):
+def test_a_campaign_is_measured_again_after_a_save(browser, tmp_path):
     shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
     file = tmp_path / "lab" / CAMPAIGN.name
     with serving(tmp_path, str(file)) as own:
-        context = running.new_context()
+        context = browser.new_context()
         page = context.new_page()
         page.set_default_timeout(120_000)  # a first measurement brings in the libraries of signals
         page.goto(own.url)
@@ -194,12 +194,12 @@ def test_a_campaign_is_measured_again_after_a_save(running, tmp_path):
         context.close()
 
 
-def test_a_campaign_that_is_refused_says_why_and_is_measured_again(running, tmp_path):
+def test_a_campaign_that_is_refused_says_why_and_is_measured_again(browser, tmp_path):
     shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
     file = tmp_path / "lab" / CAMPAIGN.name
     text = file.read_text("utf-8")
     with serving(tmp_path, f"lab/{CAMPAIGN.name}") as own:
-        context = running.new_context(color_scheme="dark")
+        context = browser.new_context(color_scheme="dark")
         page = context.new_page()
         page.set_default_timeout(120_000)
         for broken, why in (

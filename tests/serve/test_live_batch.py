@@ -26,13 +26,13 @@ def batch(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def own(batch):
-    with serving(batch.parent, str(batch)) as running:
-        yield running
+    with serving(batch.parent, str(batch)) as server:
+        yield server
 
 
 @pytest.mark.smoke
-def test_a_row_of_a_batch_opens_live(running, own):
-    visit = Live(running, own)
+def test_a_row_of_a_batch_opens_live(browser, own):
+    visit = Live(browser, own)
     names = visit.page.locator("#variants tbody th a")
     assert names.count() == 2
     opened = []
@@ -50,7 +50,7 @@ def test_a_row_of_a_batch_opens_live(running, own):
     visit.close()
 
 
-def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running, tmp_path):
+def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(browser, tmp_path):
     base = {"base": "single-embedded", "set": {"output.formats": []}}
     sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "walls")
     options = BatchOptions(("unit",), check=False, folders=False)
@@ -60,7 +60,7 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running, tmp
         folder = next(row[0] for row in page_data(tmp_path / "walls", modelled=None)[0]["table"]["rows"])
         for wrong in ("single-embedded-000000000000", f"other-{folder[-12:]}", folder[-12:-1], "-"):
             assert own.send(f"/variant/{wrong}")[0] == 404
-        visit = Live(running, own)
+        visit = Live(browser, own)
         # The page begins with the batch's first variant.
         assert visit.page.input_value('input[name="name"]') == "single-embedded"
         assert visit.page.input_value(WALL) == "1"
@@ -69,12 +69,12 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running, tmp
         visit.close()
 
 
-def test_a_refused_row_opens_with_its_values_and_its_refusal(running, tmp_path):
+def test_a_refused_row_opens_with_its_values_and_its_refusal(browser, tmp_path):
     base = {"base": "single-embedded", "set": {"output.formats": []}}
     sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [9.0, 1.0]}}, Path(), "walls")
     run(sweep, tmp_path / "walls", BatchOptions(("unit",), check=False), SerialExecutor(), workers=1)
     with serving(tmp_path, str(tmp_path / "walls")) as own:
-        visit = Live(running, own)
+        visit = Live(browser, own)
         # The page begins with the first variant that was made.
         assert visit.page.input_value(WALL) == "1"
         row = visit.page.locator("#variants tbody th a").first

@@ -10,8 +10,8 @@ from unitcad.validation import load, templates
 
 
 @pytest.fixture
-def live(running, server):
-    visit = Live(running, server)
+def live(browser, server):
+    visit = Live(browser, server)
     yield visit
     visit.close()
 
@@ -198,9 +198,9 @@ def test_everything_works_from_the_keyboard(live):
     live.settled()
 
 
-def test_nothing_is_wider_than_its_column(running, server):
+def test_nothing_is_wider_than_its_column(browser, server):
     """On a phone, a tablet, a desk and a wide screen, everything open, one pinned, one refused; dark."""
-    visit = Live(running, server, width=390, height=844, dark=True)
+    visit = Live(browser, server, width=390, height=844, dark=True)
     visit.page.click("text=Pin this variant")
     visit.choose(WALL, "0.2")
     visit.page.evaluate("() => document.querySelectorAll('details').forEach((one) => { one.open = true; })")
@@ -215,9 +215,9 @@ def test_nothing_is_wider_than_its_column(running, server):
     visit.close()
 
 
-def test_a_refused_spec_that_is_saved_is_said_to_be_refused(running, tmp_path):
+def test_a_refused_spec_that_is_saved_is_said_to_be_refused(browser, tmp_path):
     with serving(tmp_path) as own:
-        visit = Live(running, own)
+        visit = Live(browser, own)
         visit.choose(WALL, "0.2")
         visit.page.click("text=Save spec")
         visit.until(lambda: "Saved" in visit.page.inner_text("#do"))
@@ -244,9 +244,9 @@ WORDS = """() => {
 
 
 @pytest.mark.smoke
-def test_save_and_build_from_the_page(running, tmp_path):
+def test_save_and_build_from_the_page(browser, tmp_path):
     with serving(tmp_path) as own:
-        visit = Live(running, own)
+        visit = Live(browser, own)
         visit.page.click("text=As TOML text")
         visit.choose("#text", visit.page.input_value("#text") + '\n[output]\nformats = ["stl"]\n')
         visit.page.click("text=Save spec")
@@ -301,7 +301,7 @@ def test_an_older_answer_does_not_replace_a_newer_one(live):
 
 
 @pytest.mark.long
-def test_ten_thousand_random_edits(running, server):
+def test_ten_thousand_random_edits(browser, server):
     """No error on either side, and no growth of memory or of the page's elements after the first thousand.
 
     A worker that answers for units levels off at 110 MB after some 500 distinct ones, where its caches are full.
@@ -311,7 +311,7 @@ def test_ten_thousand_random_edits(running, server):
     import psutil
 
     rng = random.Random(20261122)
-    visit = Live(running, server)
+    visit = Live(browser, server)
     visit.page.evaluate("() => document.querySelectorAll('.spec-form details').forEach((one) => { one.open = true; })")
 
     def grown():
@@ -376,9 +376,9 @@ def test_moulds_that_are_refused_are_not_shown(live):
     assert "has no moulds" in live.page.inner_text("#faults")
 
 
-def test_a_server_that_has_ended_is_told_at_every_button(running, tmp_path):
+def test_a_server_that_has_ended_is_told_at_every_button(browser, tmp_path):
     with serving(tmp_path) as own:
-        visit = Live(running, own)
+        visit = Live(browser, own)
         visit.page.fill("#file-name", "../x")
         visit.page.click("text=Save spec")
         assert "letters, digits" in visit.page.inner_text("#do")

@@ -11,10 +11,10 @@ SHOWN = {"bench.html": "Mould set", "casting.md": "# ", "spec.toml": "diameter_m
 
 
 @pytest.fixture(scope="module")
-def built(running, tmp_path_factory):
+def built(browser, tmp_path_factory):
     """A server and the page of what was built on it."""
     with serving(tmp_path_factory.mktemp("built")) as own:
-        visit = Live(running, own)
+        visit = Live(browser, own)
         visit.page.click("text=Build this")
         visit.page.wait_for_selector('.job[data-ended="true"]', timeout=120_000)
         with visit.context.expect_page() as opened:

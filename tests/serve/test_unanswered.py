@@ -20,8 +20,8 @@ def fulfil(visit, answer):
     visit.page.route("**/ask", handle)
 
 
-def test_a_time_limit_is_not_told_as_a_refusal(running, server):
-    visit, late = Live(running, server), {"moulds": "not judged: it took more than 60 s"}
+def test_a_time_limit_is_not_told_as_a_refusal(browser, server):
+    visit, late = Live(browser, server), {"moulds": "not judged: it took more than 60 s"}
     late["estimate"] = "not estimated: it took more than 30 s"
     fulfil(
         visit, lambda ask: ask["what"] in late and (500, {"faults": [{"message": late[ask["what"]]}], "again": True})
@@ -40,8 +40,8 @@ def test_a_time_limit_is_not_told_as_a_refusal(running, server):
     visit.close()
 
 
-def test_a_fault_of_the_server_leaves_paler_figures_and_a_button(running, server):
-    visit, ended = Live(running, server), [True]
+def test_a_fault_of_the_server_leaves_paler_figures_and_a_button(browser, server):
+    visit, ended = Live(browser, server), [True]
     fault = {"faults": [{"message": "the worker ended: out of memory, or a fault in a kernel"}], "again": True}
     fulfil(visit, lambda ask: ask["what"] == "unit" and ended and (500, fault))
     visit.page.fill(WALL, "1.3")

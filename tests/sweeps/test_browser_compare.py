@@ -30,8 +30,8 @@ def walls(tmp_path_factory):
 
 
 @pytest.fixture
-def visit(running, walls):
-    seen = Visit(running, walls / "report.html")
+def visit(browser, walls):
+    seen = Visit(browser, walls / "report.html")
     yield seen
     seen.close()
 
