@@ -56,7 +56,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             if cast and silicone:
                 whole = united(layers) if whole is None else whole
                 piece, whole = _parted(moulds, whole, removal)
-                if piece.is_empty():
+                if not thick_pieces(piece):
                     yield _out_of_order(where, "there is no silicone where this part should be")
                     continue
                 # Silicone bends, so a remaining layer lets a part go.

@@ -119,13 +119,19 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
     gone. `sound`: see `suggest`.
     """
     typed: list[tuple[Refusal, Changes]] = []
-    renamed: tuple[str, ...] = ()  # tables in which another word, as of a kind, may make other keys necessary
+    renamed, guessed = False, tuple[str, ...]()
     for refusal, passed in _refusals(data, judge, sound):
-        derived = (refusal.value is None or isinstance(refusal, UnknownKey)) and refusal.field.startswith(renamed)
+        missing, word = refusal.value is None, passed.get(refusal.field)
+        # Another word, as of a kind, makes other keys necessary, or unknown.
+        derived = (renamed and missing and refusal.nearest is not None) or (
+            refusal.field.startswith(guessed) and (missing or isinstance(refusal, UnknownKey))
+        )
         if not typed or (_is_wrong_by_itself(refusal, data, judge, sound) and not derived):
             typed.append((refusal, passed))
-        if isinstance(refusal.value, str) and isinstance(passed.get(refusal.field), str):
-            renamed += (refusal.field.rpartition(".")[0],)
+        if isinstance(refusal.value, str) and isinstance(word, str):
+            renamed = True
+            if word != refusal.nearest:
+                guessed += (refusal.field.rpartition(".")[0],)
     if len(typed) > 1 and (culprit := culprit_of(data, judge, sound)):
         first = typed[0][0]
         if first.field in culprit:
