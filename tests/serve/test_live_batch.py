@@ -62,7 +62,7 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(browser, tmp
             assert own.send(f"/variant/{wrong}")[0] == 404
         visit = Live(browser, own)
         # The page begins with the batch's first variant.
-        assert visit.page.input_value('input[name="name"]') == "single-embedded"
+        assert visit.page.input_value('input[name="name"]') == "single-embedded-wall1"
         assert visit.page.input_value(WALL) == "1"
         visit.page.locator("#variants tbody th a").nth(1).click()
         visit.until(lambda: visit.page.input_value(WALL) == "1.5")
