@@ -99,7 +99,7 @@ def _findings(where: str, there: _There, facets: float, known: dict[tuple[str, s
         if not len(meeting):
             continue
         if (a, b) not in known:
-            known[a, b] = sum(common_volume(others[k], parts[i], facets) for i, k in meeting)
+            known[a, b] = sum(common_volume(parts[i], others[k], facets) for i, k in meeting)
         pairs.append(at_most("C200", f"{where}: {a} and {b}", known[a, b], OVERLAP, "mm3"))
     return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
 
@@ -108,16 +108,16 @@ def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
     """Return the volume that two solids share, mm3, without films up to `facets` thick.
 
     If faces coincide the mesh kernel now and then keeps a part that is not shared, but not in each order of the two and
-    not in their difference, so a finding needs all of them. `other` is cut first: it takes half as long.
+    not in their difference, so a finding needs all of them. `one` is cut first: it takes half as long.
     """
-    shared = other ^ one
+    shared = one ^ other
     volume = float(shared.volume())
     if volume <= OVERLAP:
         return volume
     if facets:
-        opinions = (thick_pieces(solid, facets) for solid in (shared, one ^ other))
+        opinions = (thick_pieces(solid, facets) for solid in (shared, other ^ one))
         return min(sum(float(piece.volume()) for piece in pieces) for pieces in opinions)
-    return min(volume, float((one ^ other).volume()), float(one.volume() - (one - other).volume()))
+    return min(volume, float((other ^ one).volume()), float(other.volume() - (other - one).volume()))
 
 
 def _meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -97,12 +97,12 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     a direction of its own: the parts of cells are the first ones that are taken out.
     """
     lay, base = moulds.plan.layout, moulds.solids[moulds.plan.base_of(step)]
-    shapes, cells = (*step.earlier, *step.layer), len(lay.cells)
-    if len(step.layer) == cells and not _ways(step):
+    shapes, cells, ways = (*step.earlier, *step.layer), len(lay.cells), _ways(step)
+    if len(step.layer) == cells and not ways:
         bodies = [united(moulds.meshes(shapes[i::cells])) for i in range(cells)]
         return [Peel(body, base) for body in bodies]
     whole = united(moulds.meshes(shapes))
-    if ways := _ways(step):
+    if ways:
         return [_turned(whole ^ moulds.mesh_of(within), base, way) for within, way in ways[:cells]]
     half = lay.pitch / 2
     _, _, low, _, _, high = whole.bounding_box()
