@@ -262,7 +262,5 @@ def _code_may_run():
 def _pictures_are_lists():
     """A picture's bytes are the list of what is in it: drawing takes four times as long as all the rest."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            views.BenchPictures, "picture", lambda bench, name: repr(views.views(bench._moulds)[name]).encode()
-        )
+        patch.setattr(views.BenchPictures, "picture", lambda bench, name: repr(bench._views[name]).encode())
         yield

@@ -1,6 +1,5 @@
 """`unitcad accuracy`: errors against independent references, amplifications by exact laws, and its exit codes."""
 
-import gc
 import json
 import math
 from dataclasses import replace
@@ -47,14 +46,6 @@ def test_an_error_counts_by_what_exceeds_the_references_own_bound():
     assert (found.error, found.bound, found.over_bound) == pytest.approx((0.03, 0.02, 1.0))
     assert compare(_response(1.005, 0.0), _response(1.0, 0.01)).over_bound == 0
     assert compare(_response(math.nan, 0.02), _response(1.0, 0.01)).over_bound == math.inf
-
-
-@pytest.fixture(scope="module", autouse=True)
-def no_collection():
-    """A timed call first collects garbage, which here takes longer than the call."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gc, "collect", lambda: None)
-        yield
 
 
 @pytest.fixture(scope="module")

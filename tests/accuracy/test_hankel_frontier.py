@@ -1,7 +1,5 @@
 """The displacement beside FFTLog: each error has the first setting that reaches it, FFTLog the best of its ranges."""
 
-import gc
-
 import numpy as np
 
 from benchmarks.accuracy import hankel_frontier
@@ -11,7 +9,6 @@ from benchmarks.accuracy.hankel_frontier import Best
 
 def test_fftlog_has_the_range_and_bias_that_come_nearest(monkeypatch):
     """With the range and bias of the other table 128 points are 80 times as far off."""
-    monkeypatch.setattr(gc, "collect", lambda: None)
     case = cases()[0]
     exact = brute_force(case)
     monkeypatch.setattr(hankel_frontier, "_POINTS", (64, 128))
