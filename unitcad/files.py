@@ -252,34 +252,31 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
 
     `name` is the entry of `parent` that the work is for; `leftovers` yields it with the folder of a killed process.
     """
-    from filelock import FileLock
+    from filelock import FileLock, Timeout
 
-    token = secrets.token_hex(8)
-    folder = parent / f"{TEMPORARY}{token}"
+    while True:
+        token = secrets.token_hex(8)
+        folder = parent / f"{TEMPORARY}{token}"
+        try:
+            folder.mkdir(0o700)
+        except OSError as error:
+            error.filename = str(parent)  # the name that the user knows
+            raise
+        lock = FileLock(folder / LOCK, thread_local=False)
+        with contextlib.suppress(Timeout):  # another process takes the folder for a leftover and removes it
+            lock.acquire(blocking=False)
+            break
     try:
-        folder.mkdir(0o700)
-    except OSError as error:
-        error.filename = str(parent)  # the name that the user knows
-        raise
-    lock = FileLock(folder / LOCK, thread_local=False)
-    try:
-        lock.acquire(blocking=False)
         write_new(folder / MARK, f"{FORMAT}\n{token}\n{name}\n".encode())
         yield folder
     finally:
+        with contextlib.suppress(OSError):  # all but the lock, the mark last
+            for path in sorted({*folder.iterdir()} - {folder / LOCK}, key=lambda path: path.name == MARK):
+                shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink()
         lock.release()
-        _remove_scratch(folder)
-
-
-def _remove_scratch(folder: Path) -> None:
-    """Remove a scratch folder: quickly if its work has left only lock and mark."""
-    try:
-        for name in (MARK, LOCK):
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(folder / name)
-        os.rmdir(folder)
-    except OSError:
-        shutil.rmtree(folder, ignore_errors=True)
+        with contextlib.suppress(OSError):  # `leftovers` of another process may remove it at the same time
+            (folder / LOCK).unlink(missing_ok=True)
+            folder.rmdir()
 
 
 def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
@@ -300,7 +297,7 @@ def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
         except OSError:  # it is held (Timeout is an OSError), or can't be
             continue
         try:
-            if _marked(folder) == name:
+            if _marked(folder) in (name, ""):  # its process may have ended meanwhile
                 yield folder, name
         finally:
             lock.release()

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import filelock
 import pytest
 
 from unitcad import files
@@ -73,6 +74,37 @@ def test_what_a_killed_process_left_goes_and_what_a_live_one_has_stays(tmp_path)
     assert len(list(tmp_path.iterdir())) == 1
     clear_leftovers(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scratch_folder_whose_work_ends_while_another_process_looks_is_removed(tmp_path, monkeypatch):
+    """Its lock is then made anew by the one that looks, and would stay."""
+    marked, work = files._marked, files.scratch(tmp_path, "result")
+
+    def look(folder):
+        name = marked(folder)
+        monkeypatch.setattr(files, "_marked", marked)
+        work.__exit__(None, None, None)
+        return name
+
+    work.__enter__()
+    monkeypatch.setattr(files, "_marked", look)
+    clear_leftovers(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scratch_folder_that_another_process_takes_for_a_leftover_is_made_again(tmp_path, monkeypatch):
+    acquire, taken = filelock.FileLock.acquire, []
+
+    def late(lock, blocking):
+        if not taken:
+            taken.append(lock.lock_file)
+            raise filelock.Timeout(lock.lock_file)
+        return acquire(lock, blocking=blocking)
+
+    monkeypatch.setattr(filelock.FileLock, "acquire", late)
+    with files.scratch(tmp_path) as folder:
+        assert str(folder / files.LOCK) not in taken
+        assert (folder / files.MARK).exists()
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):

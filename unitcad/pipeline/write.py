@@ -301,10 +301,11 @@ def clear_leftovers(out: Path) -> None:
 
 def expect_folder(folder: Path) -> None:
     """Raise UnitcadError if the place of a result is no real folder, so that nothing is written through a link."""
-    if folder.is_symlink():
-        raise UnitcadError(f"{folder}: is a link, not a folder; remove it or choose another folder with -o")
-    if folder.exists() and not folder.is_dir():
-        raise UnitcadError(f"{folder}: is a file, not a folder; remove it or choose another folder with -o")
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        mode = folder.lstat().st_mode  # once: another process may swap the folder at any time
+        if not stat.S_ISDIR(mode):
+            kind = "link" if stat.S_ISLNK(mode) else "file"
+            raise UnitcadError(f"{folder}: is a {kind}, not a folder; remove it or choose another folder with -o")
 
 
 def _restore(aside: Path, folder: Path) -> None:
