@@ -180,7 +180,7 @@ def make(
         store = store_of(folder, options.shard, whole.batch, variants, options.store)
         folder, options = folder / options.shard.folder, replace(options, store=store)
     if options.only == ("estimate",) and not sweep.of_compounds:
-        return write_estimates(sweep, folder, options)
+        return write_estimates(sweep, folder, options, watch)
     with workers.executor(options.timeout) as (executor, number):
         remote = workers.scheduler is not None
         summary = run(sweep, folder, options, executor, workers=number, remote=remote, watch=watch)
