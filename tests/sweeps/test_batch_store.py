@@ -250,7 +250,7 @@ def test_a_batch_whose_store_is_refused_leaves_nothing(tmp_path):
     ],
 )  # fmt: skip
 def test_a_store_that_is_neither_a_folder_nor_a_bucket_is_refused(store, limit, tmp_path):
-    for more in ((), ("--dry-run",), ("--shard", "1/2")):
+    for more in ((), ("--dry-run",)):
         done = run_unitcad("batch", ring_sweep(tmp_path), "-o", tmp_path / "out", "--store", store, *more)
         assert (done.returncode, done.stdout, done.stderr) == (2, "", f"error: --store = {store!r}: {limit}\n")
     with pytest.raises(UnitcadError, match=re.escape(limit)):
@@ -258,10 +258,7 @@ def test_a_store_that_is_neither_a_folder_nor_a_bucket_is_refused(store, limit, 
     assert not (tmp_path / "out").exists()
 
 
-def test_a_cluster_without_a_store_makes_folders_and_no_wish_for_none_is_ignored(tmp_path):
-    options = BatchOptions(("unit",), folders=False)
-    with pytest.raises(UnitcadError, match="results of a cluster go to folders here"):  # before anybody is asked
-        make(load_sweep(ring_sweep(tmp_path)), tmp_path / "out", options, Workers(scheduler="tcp://127.0.0.1:9"))
+def test_a_table_of_estimates_has_no_folders(tmp_path):
     with pytest.raises(UnitcadError, match="estimates only are one table"):
         make(load_sweep("thickness"), tmp_path / "out", BatchOptions(("estimate",), folders=True), Workers(jobs=0))
     assert not (tmp_path / "out").exists()

@@ -16,9 +16,9 @@ from unitcad.sweeps import task as tasks
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Journal, JournalEntry, Summary
+from unitcad.sweeps.result_folders import BatchOptions
 from unitcad.sweeps.results import columns_of, write_results, write_timings
 from unitcad.sweeps.run import Watch, batch_head, count_entry, count_variants
-from unitcad.sweeps.shards import BatchOptions
 from unitcad.sweeps.sweep import Sweep
 
 
