@@ -35,7 +35,7 @@ from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.batch_call import check_tables, folders_for, make, preview
-from unitcad.sweeps.executors import Certificates, Workers
+from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.journal import Preview, Summary
 from unitcad.sweeps.result_folders import BatchOptions, export_variants
 from unitcad.sweeps.run import Watch
@@ -122,19 +122,8 @@ def batch(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, such as tls://host:8786. Default: none.")
     ] = None,
-    tls_ca_file: Annotated[
-        Path | None,
-        typer.Option(metavar="PEM", help="Certificate authority for tls://. Default: Dask's configuration."),
-    ] = None,
-    tls_cert: Annotated[
-        Path | None,
-        typer.Option(metavar="PEM", help="Client certificate for tls://. Default: Dask's configuration."),
-    ] = None,
-    tls_key: Annotated[
-        Path | None, typer.Option(metavar="PEM", help="Client key for tls://. Default: Dask's configuration.")
-    ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the number of variants, parts and files; make nothing.")
+        bool, typer.Option("--dry-run", help="Print the number of variants and geometries; make nothing.")
     ] = False,
     verify: Annotated[
         bool,
@@ -210,7 +199,7 @@ def batch(
     if chosen == ("estimate",) and store is not None:
         raise Refusal("--store", store, "estimates only are one table and no files: leave it out")
     folder = out or Path("out") / wanted.slug
-    workers = Workers(jobs, scheduler, Certificates(tls_ca_file, tls_cert, tls_key))
+    workers = Workers(jobs, scheduler)
     try:
         with watching(json_lines) as watch:
             summary = make(wanted, folder, options, workers, watch)
@@ -270,9 +259,6 @@ def _print_preview(size: Preview) -> None:
 
     about = "" if size.exact else "about "
     typer.echo(f"{counted(size.variants, 'variant')} of {about}{counted(size.geometries, 'geometry', 'geometries')}")
-    typer.echo(f"{about}{counted(size.parts, 'distinct part')}")
-    stored = f"{size.stored_mb:.1f} MB stored, {size.linked_mb:.1f} MB with every link counted"
-    typer.echo(f"about {counted(size.files, 'file')}, {stored}")
     for warning in size.warnings:
         warn(f"warning: {warning}")
     for refused in size.refused:

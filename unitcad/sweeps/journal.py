@@ -104,15 +104,11 @@ class RefusedVariant(Struct, frozen=True):
 
 
 class Preview(Struct, frozen=True, kw_only=True):
-    """Size of a batch that is not made; `exact`: whether variants, geometries and parts are counts."""
+    """Size of a batch that is not made; `exact`: whether its geometries are counted."""
 
     variants: int
     geometries: int
-    parts: int
     exact: bool
-    files: int
-    stored_mb: float
-    linked_mb: float
     refused_count: int
     refused: list[RefusedVariant]
     warnings: list[str] = []
