@@ -8,7 +8,8 @@ from unitcad.kernels.mesh import arrays, realise
 from unitcad.shape import cut, cylinder
 from unitcad.validation.load import every_template
 
-PAIR = ["--set", "layout.columns=2", "--set", "layout.rows=1", "--set", "sheet.strap_slot_mm=[3,8]"]
+SMALL = "layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.cavities=[1,1]"
+PAIR = [word for change in SMALL for word in ("--set", change)]
 ALL_FORMATS = {"encapsulating": [], "forearm-patch": PAIR, "forearm-pockets": PAIR}
 
 
