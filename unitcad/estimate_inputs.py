@@ -14,7 +14,6 @@ from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered import FractionalKelvinVoigt
-from unitcad.attenuation.receivers import neighbours_block
 from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, motors, tissue
 from unitcad.designs import design_of, dimensions, no_estimate
 from unitcad.errors import Refusal
@@ -78,15 +77,6 @@ def frequency_table_of_spec(
     fit = fit_of(spec)
     data = frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models), fit)
     return {**data, "fit": {**_fit_file(spec), "name": fit.name}} if fit else data
-
-
-def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: Sequence[float] = ()) -> dict[str, Any]:
-    """Return how far the first unit moves the others of a row, `pitch_mm` apart, on bare skin and with their masses.
-
-    At the first unit's frequency if none are given. Raises `Refusal` as `attenuation.receivers.neighbours_block`.
-    """
-    variants = [estimate_input(spec) for spec in specs]
-    return rounded(neighbours_block(variants, pitch_mm * 1e-3, frequencies_hz))
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:

@@ -61,7 +61,6 @@ def test_a_ratio_with_a_single_unit_is_none():
     ("words", "said"),
     [
         ((NINE, "encapsulating"), "SPEC = 'encapsulating': is a unit"),
-        ((NINE, "--pitch", "20"), "--pitch = 20: an array has its own"),
         ((NINE, "--model", "paper"), "--model = 'paper'"),
         (("encapsulating", "--masses"), "--masses: is for arrays"),
         ((NINE, "--set", "layout.pitch_mm=14"), "nearest accepted"),

@@ -1,16 +1,11 @@
 """Units side by side: reciprocity, power, closed forms, an independent solve, and figures that were once measured."""
 
-import json
-
 import numpy as np
 import pytest
-from msgspec.structs import replace
-from typer.testing import CliRunner
 
 from unitcad.attenuation import HalfSpace, LayeredMedium, Point
-from unitcad.attenuation.inputs import Quantity, tissue_medium
-from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, neighbours_block, unit_mass
-from unitcad.cli import app
+from unitcad.attenuation.inputs import tissue_medium
+from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.designs import unit_bodies
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
@@ -85,49 +80,6 @@ def test_mass_is_that_of_the_drawn_silicone_and_the_motor(name):
     assert mass.ends == pytest.approx([mass.value - motor.middle + end for end in motor.ends])
 
 
-def test_neighbours_refuse_what_can_not_stand_side_by_side():
+def test_patches_that_overlap_are_refused():
     with pytest.raises(Refusal, match="overlap"):
         influence(FOREARM, (THREE[0], Patch(0.011, 0, 5e-3, 0.0)), OMEGA)
-    other = estimate_input(
-        load(
-            "encapsulating",
-            [
-                "tissue.mine.all.density_kg_m3=1000",
-                "tissue.mine.all.poisson_ratio=0.4",
-                "tissue.mine.all.youngs_modulus_kpa=20",
-                "estimate.tissue=mine",
-            ],
-        )
-    )
-    with pytest.raises(Refusal) as refused:
-        neighbours_block([UNIT, other], 0.016, [125.0])
-    assert (refused.value.field, refused.value.nearest) == ("estimate.tissue", "forearm")
-
-
-def test_the_range_holds_a_softer_body_and_another_frequency():
-    """The ends of one kind, computed as nominal values of another unit."""
-    row = neighbours_block([UNIT, UNIT], 0.016)["transfer"][0]["with_masses"]
-    soft = tuple(replace(layer, shear_modulus=Quantity(layer.shear_modulus.ends[0])) for layer in UNIT.tissue)
-    for other in (replace(UNIT, tissue=soft), replace(UNIT, frequency=Quantity(UNIT.frequency.ends[1]))):
-        value = neighbours_block([other, other], 0.016)["transfer"][0]["with_masses"]["value"]
-        assert row["low"] * 0.998 <= value <= row["high"] * 1.002
-    fixed = neighbours_block([UNIT, UNIT], 0.016, [UNIT.frequency.middle])["transfer"][0]["with_masses"]
-    assert fixed["value"] == row["value"]
-    assert row["high"] - row["low"] > fixed["high"] - fixed["low"]
-
-
-def test_command_gives_the_neighbours():
-    pair = ["estimate", "encapsulating", "encapsulating", "--model", "divider"]
-    done = CliRunner().invoke(app, [*pair, "--pitch", "16", "--frequency", "100:300:200", "--json"])
-    found = json.loads(done.stdout)["neighbours"]
-    assert [row["frequency_hz"] for row in found["transfer"]] == [100, 300]
-    for row in found["transfer"]:
-        assert row["masses_change_it_by"] == pytest.approx(row["with_masses"]["value"] / row["on_bare_skin"], rel=1e-6)
-        assert row["with_masses"]["low"] <= row["with_masses"]["value"] <= row["with_masses"]["high"]
-    shown = CliRunner().invoke(app, [*pair, "--pitch", "16"]).stdout
-    assert shown.index("on bare skin") < shown.index("at the edge (measured")
-    assert "one kind at a time" in shown
-    for pitch, nearest in (("10", 14), ("1000", 200), ("nan", 14), ("-inf", 14)):
-        refused = CliRunner().invoke(app, [*pair, "--pitch", pitch, "--json"])
-        assert isinstance(refused.exception, Refusal)
-        assert refused.exception.nearest == nearest

@@ -10,29 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
+from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity
 from unitcad.attenuation.layered import LayeredMedium, components
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.errors import Refusal
 
 FORCES: dict[Drive, tuple[complex, complex, complex]] = {"flat": (1.0, -1.0j, 0.0), "axial": (0.0, 0.0, 1.0)}
 """A newton along x, y and z: one that turns in the plane of the skin, and one along the axis."""
-MOST_PITCH_MM = 200.0
-RANGE = (
-    "least and largest as masses, the tissue's moduli, damping and thicknesses and, unless it is asked for, the "
-    "frequency go to either end of their ranges, one kind at a time"
-)
-ASSUMPTIONS = [
-    "Each unit is a mass on the disc of skin under it, which it loads by a uniform traction; it does not turn or bend.",
-    "A unit's mass is its silicone's and its motor's, the motor's assumed where its entry gives none; the circuit's is "
-    "left out.",
-    "The first unit drives with a force on its mass; the others' motors stand still.",
-]
 _RINGS, _SPOKES = 4, 12
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -103,88 +90,6 @@ def unit_mass(variant: EstimateInput) -> Quantity:
     motor = shape.motor_mass
     low, high = motor.ends
     return Quantity(silicone + motor.middle, silicone + low, silicone + high, motor.note)
-
-
-def neighbours_block(
-    variants: Sequence[EstimateInput], pitch: float, frequencies: Sequence[float] = ()
-) -> dict[str, Any]:
-    """Return the estimate's `neighbours`: units in a row, `pitch` (m) apart, and how far the first moves the others.
-
-    For each frequency (Hz; none: the first unit's, with its range) and each other unit: |u| over that of the first, on
-    bare skin and with the units' masses. low and high: `RANGE`.
-    Raises `Refusal` for fewer than two units, for units that overlap and for units on different tissues.
-    """
-    _check(variants, pitch)
-    first = variants[0]
-    masses = [unit_mass(variant) for variant in variants]
-    radii = [variant.diameter / 2.0 for variant in variants]
-    forces = np.zeros((len(variants), 3), dtype=np.complex128)
-    forces[0] = FORCES[first.drive]
-    rows = []
-    patches = [Patch(i * pitch, 0.0, radius, 0.0) for i, radius in enumerate(radii)]
-    middle, *mass_ends = [[m.middle for m in masses], *([m.ends[end] for m in masses] for end in (0, 1))]
-
-    def transfer(hertz: float, end: dict[str, int], *cases: list[float]) -> list[np.ndarray]:
-        omega = 2.0 * np.pi * hertz
-        g = influence(tissue_medium(first.tissue, end), patches, omega, 1e-3 if end else 1e-4)
-        sizes = [np.linalg.norm(motion(g, case, forces, omega), axis=1) for case in cases]
-        return [size / size[0] for size in sizes]
-
-    varied = [{kind: end} for kind in ("moduli", "damping", "thicknesses") for end in (0, 1)]
-    none = [0.0] * len(masses)
-    for frequency in [Quantity(hertz) for hertz in frequencies] or [first.frequency]:
-        hertz = frequency.middle
-        bare, loaded, *others = transfer(hertz, {}, none, middle, *mass_ends)
-        others += [transfer(hertz, end, middle)[0] for end in varied]
-        others += [transfer(end, {}, middle)[0] for end in set(frequency.ends) - {hertz}]
-        for i in range(1, len(variants)):
-            value, *ends = [float(one[i]) for one in (loaded, *others)]
-            rows.append(
-                {
-                    "frequency_hz": hertz,
-                    "unit": variants[i].name,
-                    "at_mm": i * pitch * 1e3,
-                    "on_bare_skin": float(bare[i]),
-                    "with_masses": {"value": value, "low": min(value, *ends), "high": max(value, *ends)},
-                    "masses_change_it_by": value / float(bare[i]),
-                }
-            )
-    return {
-        "note": "|u| of a unit over that of the first, which drives; |u| as in `layered.u_definition`",
-        "range": RANGE,
-        "pitch_mm": pitch * 1e3,
-        "drive": first.drive,
-        "tissue": first.tissue_name,
-        "units": [
-            {
-                "name": variant.name,
-                "mass_g": {"value": mass.middle * 1e3, "low": mass.ends[0] * 1e3, "high": mass.ends[1] * 1e3},
-            }
-            for variant, mass in zip(variants, masses, strict=True)
-        ],
-        "transfer": rows,
-        "assumptions": ASSUMPTIONS,
-    }
-
-
-def _check(variants: Sequence[EstimateInput], pitch: float) -> None:
-    mm = pitch * 1e3
-    if len(variants) < 2:
-        number = "" if np.isfinite(mm) else "must be a finite number of mm, and "
-        raise Refusal(
-            "--pitch", mm if not number else str(mm), f"{number}needs two units or more; a spec may be named twice"
-        )
-    least = max(a.diameter + b.diameter for a, b in pairwise(variants)) * 500.0
-    if not least * (1.0 - 1e-9) <= mm <= MOST_PITCH_MM:
-        nearest = MOST_PITCH_MM if mm > MOST_PITCH_MM else least
-        value = mm if np.isfinite(mm) else str(mm)
-        raise Refusal(
-            "--pitch", value, f"must be from {least:g} mm, where units touch, to {MOST_PITCH_MM:g} mm", nearest
-        )
-    for variant in variants:
-        if variant.tissue != variants[0].tissue:
-            limit = f"units side by side are on one tissue, {variants[0].tissue_name}"
-            raise Refusal("estimate.tissue", variant.tissue_name, limit, variants[0].tissue_name)
 
 
 def _over_disc() -> np.ndarray:

@@ -17,7 +17,7 @@ from unitcad.cli.output import console, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
-from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec, neighbours_of_specs
+from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
@@ -136,25 +136,6 @@ def _fem_lines(block: dict[str, Any]) -> list[str]:
         + join_words(f"{number(100 * ratio, 2)} % ({drive})" for drive, ratio in block["skin_over_edge"].items())
         + ". The paper does not state which of the two it measured.",
     ]
-
-
-def print_neighbours(data: dict[str, Any]) -> None:
-    """Print how far the first unit of a row moves each other one, on bare skin and with the units' masses."""
-    first, *_ = data["units"]
-    masses = ", ".join(f"{unit['name']} {level(unit['mass_g'])} g" for unit in data["units"])
-    row_of = f"units in a row, {data['pitch_mm']:g} mm apart"
-    title = f"|u|, % of that of {first['name']}, which drives ({data['drive']}): {row_of}"
-    table = Table("unit", "mm away", "Hz", "on bare skin", "with masses", "masses change it by", title=title)
-    for row in data["transfer"]:
-        bare, change = f"{100 * row['on_bare_skin']:.3g}", f"x {row['masses_change_it_by']:.2f}"
-        place = f"{row['at_mm']:g}", f"{row['frequency_hz']:g}"
-        table.add_row(row["unit"], *place, bare, level(row["with_masses"], 100), change)
-    screen = console()
-    screen.print(table)
-    screen.print(f"  masses: {masses}", soft_wrap=True)
-    screen.print(f"  range: {data['range']}", soft_wrap=True)
-    for line in data["assumptions"]:
-        screen.print(f"  {line}", soft_wrap=True)
 
 
 def _models(data: dict[str, Any]) -> Table:
@@ -395,12 +376,6 @@ def estimate(
             metavar="HZ|FROM:TO:STEP", help="One frequency, or a table over frequencies. Default: the motor's."
         ),
     ] = "",
-    pitch: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MM", help="Pitch of units in a row; prints how far the first moves the others. Default: one unit."
-        ),
-    ] = None,
     masses: Annotated[
         bool, typer.Option("--masses", help="Include the units' masses in an array's crosstalk.")
     ] = False,
@@ -427,28 +402,23 @@ def estimate(
     specs = [confirm_known(name) for name in specs]
     kinds = [kind for kind in map(compound_kind, specs) if kind]
     if kinds:
-        if pitch is not None:
-            raise Refusal("--pitch", pitch, "an array has its own pitch: --set layout.pitch_mm=...")
         if model:
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
         return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), hertz, masses, details, as_json)
     if masses:
-        raise Refusal("--masses", None, "is for arrays; units in a row, with their masses: --pitch")
+        raise Refusal("--masses", None, "is for arrays")
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)
-    beside = {} if pitch is None else {"neighbours": neighbours_of_specs(loaded, pitch, hertz)}
     if ":" in frequency:
         estimates = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
     else:
         with progress("estimate") as stage:
             estimates = [estimate_spec(spec, models, hertz[0] if hertz else None, say=stage) for spec in loaded]
     if as_json:
-        print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates, **beside})
+        print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
         return
 
-    for block in beside.values():
-        print_neighbours(block)
     if ":" in frequency:
         for one in estimates:
             print_frequencies(one)

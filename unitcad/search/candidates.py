@@ -20,7 +20,6 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.measured import FIELDS, stack_inputs
 from unitcad.attenuation.edge.ranges import Predictive, lead_of
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
-from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.casting.figures import at_room
 from unitcad.casting.procedure import procedure
 from unitcad.designs import dimensions
@@ -29,7 +28,7 @@ from unitcad.designs.dimensions import MOTOR_CLEARANCE
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import drawn_input, silicone_layer
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.search.target_file import MOST_GEOMETRIES, Target
+from unitcad.search.target_file import MOST_GEOMETRIES, MOST_PITCH_MM, Target
 from unitcad.spec import Spec
 from unitcad.text import join_words, number, some
 from unitcad.validation import from_data

@@ -22,7 +22,6 @@ from msgspec import Meta, Struct
 
 from unitcad import catalogue
 from unitcad.attenuation.edge.ranges import LabFit
-from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 from unitcad.designs import shipped as designs
@@ -33,6 +32,7 @@ from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
 from unitcad.validation.defaults import lab_fit
 from unitcad.validation.load import load_file
 
+MOST_PITCH_MM = 200.0
 Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
 Ratio = Annotated[
     float, Meta(ge=1e-6, le=1, description="skin at a neighbour's middle, pitch_mm away, over that at the unit's edge")
