@@ -87,12 +87,6 @@ def test_mix_covers_waste_and_least_batch():
     assert mix.mix_error_pct == pytest.approx(100 * 0.005 / mix.part_a_g)
 
 
-def test_play_moves_walls():
-    spec = set_of("encapsulating").spec
-    assert figures.wall_range(spec, 0, 0.15) == pytest.approx((1.10, 1.40))
-    assert figures.wall_range(spec, 1, 0.15) == pytest.approx((0.95, 1.55))
-
-
 def test_weep_goes_with_the_cube_of_the_clearance():
     one, two = (
         set_of("encapsulating", f"moulds.window_clearance_mm={c}", "moulds.layer_mm=0.005") for c in (0.05, 0.1)
@@ -222,10 +216,6 @@ def test_flats_of_the_printed_pieces_end_whole_layers():
         asked = {6 + 2.11} if tool.kind == "base" else set()  # the core's top is the unit's
         off = {h for h in found if abs(h / 0.2 - round(h / 0.2)) > 0.02}
         assert all(any(abs(h - a) < 2e-3 for a in asked) for h in off), (tool.name, off)
-
-
-def test_no_label_reads_as_a_cups_number():
-    assert all("C" not in set_of(name).plan.label for name in templates())
 
 
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
