@@ -94,7 +94,7 @@ def test_the_files_of_crosstalk_and_circuit():
     }
     joined = load_array("forearm-patch", ["output.formats=[]"])
     made, why = circuit_files(joined)
-    assert set(made) == {"circuit.dxf", "circuit.svg", "circuit.kicad_pcb", "circuit-pads.csv"}
+    assert set(made) == {"circuit.dxf", "circuit.svg", "circuit-pads.csv"}
     assert why == {}
     assert b"<title>circuit</title>" in crosstalk_files(joined)["crosstalk-patch.svg"]
 

@@ -32,8 +32,8 @@ _ENDS = {"low": "p10", "high": "p90"}
 DIGITS = 6
 ASSUMPTIONS = [
     "The decay is that of the bare, laterally uniform skin under each unit's own motor; the other units, the sheet and "
-    "the circuit are not on it. With each unit as a mass on its disc of skin, sums of three shipped arrays were 7 to 20 "
-    "per cent higher.",
+    "the circuit are not on it. With each unit as a mass on its disc of skin, sums of three shipped arrays were 7 to "
+    "20 % higher.",
     "A flat motor's force turns in the plane of the skin: |u| is then alike at every angle, and needs no direction.",
     "|u| is the root of the sum of the squares of the three components' amplitudes. `axial_u_z` is only |u_z| under "
     "an axial drive, which some print.",
