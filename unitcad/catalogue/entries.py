@@ -65,7 +65,7 @@ RibInterference = Annotated[
     float, Meta(ge=0, le=2, description="interference of a cup's ribs with its plinth, per side; 0: no ribs")
 ]
 SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="gap between a cup's foot and the plate")]
-SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="height of the slot for a tail or wires")]
+SlotHeight = Annotated[float, Meta(ge=0.05, le=25, description="height of the slot for a tail or wires")]
 SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="extra width of the slot, over tail or wires")]
 Nozzle = Annotated[float, Meta(ge=0.1, le=2, description="bore of the nozzle, of a printer of filament")]
 BoreCompensation = Annotated[

@@ -1,18 +1,21 @@
 """The tables of a spec as typed in a TOML file. Lengths in mm, the unit in each name.
 
-None means that the key is missing; `unitcad.spec.resolved` has the same spec with every value there. Only types and
-ranges of single values are checked here. The design and `validation` check conditions on several values.
+Validation works out the values that a file leaves out (`DERIVED`); a resolved spec (`unitcad.spec.resolved`) has the
+same tables with every value there. Only types and ranges of single values are checked here. The design and
+`validation` check conditions on several values.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 
+DERIVED: Any = None
+"""The default of a value that validation works out. Only a spec that is not resolved yet contains it."""
 DEFAULT_MOTOR = "LCM0720A3463F"
 """The motor of a spec that gives neither a part nor a size."""
 LEAST_LAYER = 0.5
@@ -55,13 +58,11 @@ class MotorTable(Table, frozen=True, kw_only=True):
     part: Annotated[
         str | None, Meta(description="motor of the catalogue (unitcad list motors), or of the spec's own [motors.NAME]")
     ] = None
-    diameter_mm: Annotated[kinds.MotorDiameter | None, Meta(description="diameter of the can; default: the part's")] = (
-        None
+    diameter_mm: Annotated[kinds.MotorDiameter, Meta(description="diameter of the can; default: the part's")] = DERIVED
+    thickness_mm: Annotated[kinds.MotorThickness, Meta(description="thickness of the can; default: the part's")] = (
+        DERIVED
     )
-    thickness_mm: Annotated[
-        kinds.MotorThickness | None, Meta(description="thickness of the can; default: the part's")
-    ] = None
-    drive: kinds.Drive | None = None
+    drive: kinds.Drive = DERIVED
     fill: Annotated[bool, Meta(description="true: Layer 1 reaches the motor, without a ring of air between them")] = (
         False
     )
@@ -89,12 +90,11 @@ class FpcbTable(Table, frozen=True, kw_only=True):
     ] = 3.0
     tail_length_mm: Annotated[Length, Meta(description="length of the tail outside the unit")] = 10.0
     pad_diameter_mm: Annotated[
-        Length | None, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
-    ] = None
+        Length, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
+    ] = DERIVED
     tail_end_width_mm: Annotated[
-        TailWidth | None,
-        Meta(description="width of the tail's free end, such as a connector, which must pass the slot"),
-    ] = None
+        TailWidth, Meta(description="width of the tail's free end, such as a connector, which must pass the slot")
+    ] = DERIVED
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
@@ -151,26 +151,26 @@ class MouldsTable(Table, frozen=True, kw_only=True):
         tuple[Cavities, Cavities] | Literal["fill"],
         Meta(description="columns and rows of cavities in one mould, or fill: as many as the bed takes"),
     ] = (1, 1)
-    bed_x_mm: kinds.Bed | None = None
-    bed_y_mm: kinds.Bed | None = None
-    bed_z_mm: kinds.Bed | None = None
-    layer_mm: kinds.LayerHeight | None = None
-    xy_play_mm: kinds.Play | None = None
-    plinth_clearance_mm: kinds.PlinthClearance | None = None
-    rib_interference_mm: kinds.RibInterference | None = None
-    bore_compensation_mm: kinds.BoreCompensation | None = None
-    seat_relief_mm: kinds.SeatRelief | None = None
-    slot_height_mm: kinds.SlotHeight | None = None
-    slot_width_clearance_mm: kinds.SlotClearance | None = None
-    window_clearance_mm: kinds.WindowClearance | None = None
-    least_wall_mm: kinds.Wall | None = None
-    skirt_wall_mm: kinds.Skirt | None = None
-    land_mm: kinds.Land | None = None
-    groove_width_mm: kinds.GrooveWidth | None = None
-    groove_depth_mm: kinds.GrooveDepth | None = None
-    filament_hole_mm: kinds.FilamentHole | None = None
-    engraving_depth_mm: kinds.EngravingDepth | None = None
-    engraving_stroke_mm: kinds.EngravingStroke | None = None
+    bed_x_mm: kinds.Bed = DERIVED
+    bed_y_mm: kinds.Bed = DERIVED
+    bed_z_mm: kinds.Bed = DERIVED
+    layer_mm: kinds.LayerHeight = DERIVED
+    xy_play_mm: kinds.Play = DERIVED
+    plinth_clearance_mm: kinds.PlinthClearance = DERIVED
+    rib_interference_mm: kinds.RibInterference = DERIVED
+    bore_compensation_mm: kinds.BoreCompensation = DERIVED
+    seat_relief_mm: kinds.SeatRelief = DERIVED
+    slot_height_mm: kinds.SlotHeight = DERIVED
+    slot_width_clearance_mm: kinds.SlotClearance = DERIVED
+    window_clearance_mm: kinds.WindowClearance = DERIVED
+    least_wall_mm: kinds.Wall = DERIVED
+    skirt_wall_mm: kinds.Skirt = DERIVED
+    land_mm: kinds.Land = DERIVED
+    groove_width_mm: kinds.GrooveWidth = DERIVED
+    groove_depth_mm: kinds.GrooveDepth = DERIVED
+    filament_hole_mm: kinds.FilamentHole = DERIVED
+    engraving_depth_mm: kinds.EngravingDepth = DERIVED
+    engraving_stroke_mm: kinds.EngravingStroke = DERIVED
     pour: Annotated[
         Literal["open", "injected"],
         Meta(description="open: struck off along the rim; injected: under a lid with sprue and vents"),
@@ -185,20 +185,18 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     ] = None
     filament_mm: Annotated[float, Meta(ge=0.2, le=20, description="diameter of the filament in the core")] = 1.75
     plinth_height_mm: Annotated[
-        Annotated[float, Meta(ge=0.6, le=100)] | None,
-        Meta(description="height of the plinth; default: 2 mm in whole printed layers"),
-    ] = None
+        float, Meta(ge=0.6, le=100, description="height of the plinth; default: 2 mm in whole printed layers")
+    ] = DERIVED
     plate_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=100)] | None,
-        Meta(description="thickness of the base's plate; default: 4 mm in whole printed layers"),
-    ] = None
+        float, Meta(ge=0.5, le=100, description="thickness of the base's plate; default: 4 mm in whole printed layers")
+    ] = DERIVED
     ledge_mm: Annotated[
         float, Meta(ge=LEAST_LEDGE, le=100, description="width of the core's ledge that carries the tongue")
     ] = 0.6
     shrinkage_percent: Annotated[
-        kinds.Shrinkage | None,
+        kinds.Shrinkage,
         Meta(description="linear shrinkage that the tools make up for, %; default: the largest of the silicones"),
-    ] = None
+    ] = DERIVED
     draft_deg: Annotated[
         float, Meta(ge=0, le=3, description="taper of bores and core, narrower upwards: silicone comes off more easily")
     ] = 0.0
@@ -237,12 +235,10 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     150.0
     """
 
-    frequency_hz: Annotated[
-        kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
-    ] = None
-    amplitude_um: Annotated[
-        kinds.Amplitude | None, Meta(description="amplitude of the motor; default: the motor's own")
-    ] = None
+    frequency_hz: Annotated[kinds.Frequency, Meta(description="frequency of the drive; default: the motor's")] = DERIVED
+    amplitude_um: Annotated[kinds.Amplitude, Meta(description="amplitude of the motor; default: the motor's own")] = (
+        DERIVED
+    )
     tissue: Annotated[
         str, Meta(description="tissue under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
     ] = "forearm"
@@ -270,9 +266,9 @@ class OutputTable(Table, frozen=True, kw_only=True):
     """
 
     formats: Annotated[
-        tuple[Format, ...] | None,
+        tuple[Format, ...],
         Meta(description="file formats; default: step, stl, 3mf, without a B-rep kernel stl, 3mf"),
-    ] = None
+    ] = DERIVED
     tolerance_mm: Annotated[
         float, Meta(ge=0.0005, le=0.2, description="largest distance of a mesh from the true round surface")
     ] = 0.01
