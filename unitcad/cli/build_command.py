@@ -116,11 +116,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
     yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
-    checks, check = manifest["mould_checks"], manifest["check"]
-    if checks:
-        passed = sum(entry["ok"] for entry in checks)
-        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
-        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+    yield from checks_line(manifest)
     if level := manifest["estimate"]:
         yield from level["lines"]
     yield from to_open(built.folder)
@@ -132,6 +128,15 @@ def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[
         lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, how in assumed.items())
         yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
         yield f"measure first; assumed: {lengths}{yours}"
+
+
+def checks_line(manifest: Manifest) -> Iterator[str]:
+    """Yield a line of the mould checks and of the faults in files, if they were checked."""
+    checks, check = manifest["mould_checks"], manifest["check"]
+    if checks:
+        passed = sum(entry["ok"] for entry in checks)
+        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
+        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
 
 
 def to_open(folder: Path) -> Iterator[str]:
