@@ -237,10 +237,10 @@ def test_explain_takes_commas_and_prefixes():
 def test_an_unknown_code_names_one_nearest_at_most():
     with pytest.raises(
         Refusal,
-        match=r"^--explain = 'T0001': unknown code; unitcad check --list-rules lists all; nearest accepted: 'T00\d'$",
+        match=r"^--explain = 'T0001': unknown code; unitcad list rules lists all; nearest accepted: 'T00\d'$",
     ):
         explain("T0001")
-    with pytest.raises(Refusal, match=r"^--select = 'boundary': unknown code; unitcad check --list-rules lists all$"):
+    with pytest.raises(Refusal, match=r"^--select = 'boundary': unknown code; unitcad list rules lists all$"):
         check_prefixes("--select", ["boundary"])
 
 

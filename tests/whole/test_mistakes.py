@@ -66,7 +66,7 @@ COMMANDS = {
     "nearest accepted: '125'",
     "estimate unit.toml --frequency 100-200": "--frequency = '100-200': must be HZ or FROM:TO:STEP, numbers above 0; "
     "nearest accepted: '100:200:10'",
-    "check part.csv --select TT": "--select = 'TT': unknown code; unitcad check --list-rules lists all",
+    "check part.csv --select TT": "--select = 'TT': unknown code; unitcad list rules lists all",
     "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
     "check parts.csv": "FILE = 'parts.csv': no such file; closest: part.csv",
     "check 'none*.stl'": "FILE = 'none*.stl': no file matches",

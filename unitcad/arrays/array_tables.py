@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from unitcad.catalogue import entries as kinds
+from unitcad.catalogue.entries import between
 from unitcad.spec.raw import CastingTable, EstimateTable, Length, MouldsTable, OutputTable, Table
 
 Construction = Literal["pockets", "back-sheet"]
@@ -29,7 +30,7 @@ class PlaceTable(Table, frozen=True, kw_only=True):
         None
     )
     angle_deg: Annotated[
-        Annotated[float, Meta(ge=-360, le=360)] | None,
+        Annotated[float, between(-360, 360)] | None,
         Meta(description="turn of the unit; default: the nearest free way for its tail"),
     ] = None
 
@@ -38,7 +39,7 @@ class LimbTable(Table, frozen=True, kw_only=True):
     """The limb that wears the array."""
 
     radius_mm: Annotated[
-        Annotated[float, Meta(ge=10, le=1000)] | None, Meta(description="radius of the limb; default: flat")
+        Annotated[float, between(10, 1000)] | None, Meta(description="radius of the limb; default: flat")
     ] = None
     cast: Annotated[Cast, Meta(description="flat: cast flat and bent; curved: a back sheet cast around the limb")] = (
         "flat"
@@ -52,25 +53,21 @@ class SheetTable(Table, frozen=True, kw_only=True):
         str | None, Meta(description="silicone of the sheet; default: that of the units' outer layer")
     ] = None
     thickness_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=50)] | None,
+        Annotated[float, between(0.5, 50)] | None,
         Meta(description="thickness of the sheet; default: 2 for pockets, 1.25 for a back sheet"),
     ] = None
-    margin_mm: Annotated[
-        float, Meta(ge=1, le=200, description="distance from the outer units to the edge or to the strap slot")
-    ] = 3.0
+    margin_mm: Annotated[float, between(1, 200, "distance from the outer units to the edge or to the strap slot")] = 3.0
     corner_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=200)] | None,
+        Annotated[float, between(0.5, 200)] | None,
         Meta(description="radius of the corners; default: concentric with the corner units"),
     ] = None
     strap_slot_mm: Annotated[
         tuple[Annotated[Length, Meta(title="width")], Annotated[Length, Meta(title="length")]] | None,
         Meta(description="width along x and length along y of the slot at either end"),
     ] = None
-    strap_web_mm: Annotated[
-        float, Meta(ge=1, le=200, description="silicone between a strap slot and the end of the sheet")
-    ] = 5.0
+    strap_web_mm: Annotated[float, between(1, 200, "silicone between a strap slot and the end of the sheet")] = 5.0
     hold_mm: Annotated[
-        Annotated[float, Meta(ge=0.01, le=5)] | None,
+        Annotated[float, between(0.01, 5)] | None,
         Meta(description="difference of the radii of unit and pocket; default: 0.2 for pockets"),
     ] = None
 
@@ -81,13 +78,11 @@ class CircuitTable(Table, frozen=True, kw_only=True):
     rows: Annotated[Literal["x", "y"], Meta(description="axis of the rows")] = "x"
     row_width_mm: Annotated[Length, Meta(description="width of rows, spine and tail")] = 3.0
     spine_mm: Annotated[
-        Annotated[float, Meta(ge=-1000, le=1000)] | None,
+        Annotated[float, between(-1000, 1000)] | None,
         Meta(description="place at which the spine crosses the rows; default: the free gap nearest to the middle"),
     ] = None
-    tail_mm: Annotated[
-        float, Meta(ge=0, le=kinds.LONGEST_MM, description="length of the tail beyond the sheet's edge")
-    ] = 10.0
-    corner_mm: Annotated[float, Meta(ge=0.2, le=20, description="radius of the outline's inner corners")] = 1.0
+    tail_mm: Annotated[float, between(0, kinds.LONGEST_MM, "length of the tail beyond the sheet's edge")] = 10.0
+    corner_mm: Annotated[float, between(0.2, 20, "radius of the outline's inner corners")] = 1.0
 
 
 class AskedArray(Table, frozen=True, kw_only=True):
@@ -111,4 +106,4 @@ class AskedArray(Table, frozen=True, kw_only=True):
     output: OutputTable = OutputTable()
 
 
-Pitch = Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)]
+Pitch = Annotated[float, between(1, kinds.LONGEST_MM)]

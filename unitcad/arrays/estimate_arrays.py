@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
 from unitcad.arrays.array import Array
@@ -17,8 +16,8 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, DRIVES, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.build_command import assumed_line, to_open
-from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.build_command import assumed_line, checks_line, to_open
+from unitcad.cli.output import console, print_indented, print_json, print_table, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
@@ -40,10 +39,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
         yield from _more_cavities(array)
-    if checks := manifest["mould_checks"]:
-        check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
-        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
-        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+    yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from json.loads(crosstalk.read_bytes())["answer"][:2]
@@ -87,8 +83,7 @@ def estimate_arrays(
         frequency = " and ".join(sorted({f"{place['frequency_hz']:g} Hz" for place in places}))
         rest = f": {counted(len(places), 'unit')} ({units}), {frequency}, {drives} drive, {data['tissue']}"
         screen.print(Text.assemble((data["array"], "bold"), rest))
-        for line in data["answer"]:
-            screen.print(f"  {line}", soft_wrap=True)
+        print_indented(*data["answer"])
         if details:
             _print_details(data)
     for one in compared:
@@ -98,48 +93,57 @@ def estimate_arrays(
 
 
 def _print_details(data: Mapping[str, Any]) -> None:
-    screen = console()
     names = [place["name"] for place in data["places"]]
     if len(names) <= _MOST_PLACES:
-        screen.print(_sums(data, names))
+        print_table(_sums(data, names), f"sum of all other units there, times one unit's edge level: {_HOW}")
     if 1 < len(names) <= _MOST_PAIRS:
-        screen.print(_matrix(data, names))
+        print_table(_matrix(data, names), "% of a unit's motion at its edge that reaches the middle of another")
     if data["band"] and len(names) > 1:
-        screen.print(_band(data))
+        title = f"nearest neighbour, %; amplitude at {data['worst']['place']} from all others: {_HOW}"
+        print_table(_band(data), title)
     ranges = f"In brackets: {data['range']}."
-    for line in (ranges, *data["assumptions"], f"Distances are {data['distances']}."):
-        screen.print(f"  {line}", soft_wrap=True)
+    print_indented(ranges, *data["assumptions"], f"Distances are {data['distances']}.")
 
 
-def _sums(data: Mapping[str, Any], names: Sequence[str]) -> Table:
+def _sums(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
     """Tabulate the amplitude at each unit from all others."""
     mixed = len({place["drive"] for place in data["places"]}) > 1
     labels = {"own_drive": "own"} if mixed else {}
     labels |= {"flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
-    heads = [f"{label}\n{head}" for label in labels.values() for head in ("root", "sum")]
-    table = Table("unit", *heads, title=f"sum of all other units there, times one unit's edge level: {_HOW}")
-    for i, name in enumerate(names):
-        cells = [data["sums"][key][kind][i] for key in labels for kind in ("root_sum_of_squares", "sum")]
-        table.add_row(name, *(number(cell, 2) for cell in cells))
-    return table
+    sums = {
+        f"{label}\n{head}": data["sums"][key][kind]
+        for key, label in labels.items()
+        for head, kind in (("root", "root_sum_of_squares"), ("sum", "sum"))
+    }
+    return [{"unit": name, **{head: number(at[i], 2) for head, at in sums.items()}} for i, name in enumerate(names)]
 
 
-def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> Table:
+def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
     """Tabulate the decay between each two units, by the own drive of the one that drives."""
-    table = Table("drives", *names, title="% of a unit's motion at its edge that reaches the middle of another")
+    rows = []
     for i, place in enumerate(data["places"]):
-        row = data["matrix"][place["drive"]]["centre"][i]
-        table.add_row(place["name"], *["-" if value is None else number(100 * value, 2) for value in row])
-    return table
+        decays = zip(names, data["matrix"][place["drive"]]["centre"][i], strict=True)
+        shares = {name: "-" if value is None else number(100 * value, 2) for name, value in decays}
+        rows.append({"drives": place["name"], **shares})
+    return rows
 
 
-def _band(data: Mapping[str, Any]) -> Table:
+def _band(data: Mapping[str, Any]) -> list[dict[str, str]]:
     """Tabulate the nearest neighbour and the worst place over the band."""
-    heads = [f"{drive}\n{head}" for drive in DRIVES for head in ("middle", "edge", "root", "sum")]
-    title = f"nearest neighbour, %; amplitude at {data['worst']['place']} from all others: {_HOW}"
-    table = Table("Hz", *heads, title=title)
-    scales = {"nearest_centre": 100, "nearest_edge": 100, "root_sum_of_squares": 1, "sum": 1}
-    for row in data["band"]:
-        cells = [number(by * row[drive][key], 2) for drive in DRIVES for key, by in scales.items()]
-        table.add_row(f"{row['frequency_hz']:g}", *cells)
-    return table
+    columns = {
+        "middle": ("nearest_centre", 100),
+        "edge": ("nearest_edge", 100),
+        "root": ("root_sum_of_squares", 1),
+        "sum": ("sum", 1),
+    }
+    return [
+        {
+            "Hz": f"{row['frequency_hz']:g}",
+            **{
+                f"{drive}\n{head}": number(by * row[drive][key], 2)
+                for drive in DRIVES
+                for head, (key, by) in columns.items()
+            },
+        }
+        for row in data["band"]
+    ]

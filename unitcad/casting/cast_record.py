@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from unitcad import files
+from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import convert
 from unitcad.spec.raw import Table
@@ -31,11 +32,11 @@ HASH_DIGITS = 12
 
 Text = Annotated[str, Meta(max_length=200)]
 Line = Annotated[str, Meta(max_length=1000)]
-Grams = Annotated[float, Meta(ge=1e-4, le=1e5)]
-Millimetres = Annotated[float, Meta(ge=0.01, le=1000)]
-Resolution = Annotated[float, Meta(ge=1e-4, le=10)]
-Index = Annotated[int, Meta(ge=1, le=99)]
-Cavity = Annotated[int, Meta(ge=1, le=999)]
+Grams = Annotated[float, between(1e-4, 1e5)]
+Millimetres = Annotated[float, between(0.01, 1000)]
+Resolution = Annotated[float, between(1e-4, 10)]
+Index = Annotated[int, between(1, 99)]
+Cavity = Annotated[int, between(1, 999)]
 
 
 class CastPour(Table, frozen=True, kw_only=True):
@@ -50,10 +51,10 @@ class CastPour(Table, frozen=True, kw_only=True):
         Text | None, Meta(description="time of mixing, ISO 8601 with the zone: 2026-03-14T09:30:00+01:00")
     ] = None
     pot_life_min: Annotated[
-        Annotated[float, Meta(ge=0.1, le=10000)] | None, Meta(description="time from the first stir to the last strike")
+        Annotated[float, between(0.1, 10000)] | None, Meta(description="time from the first stir to the last strike")
     ] = None
     cure_h: Annotated[
-        Annotated[float, Meta(ge=0.01, le=1000)] | None,
+        Annotated[float, between(0.01, 1000)] | None,
         Meta(description="time from that strike to the removal of the cup"),
     ] = None
     notes: Annotated[tuple[Line, ...], Meta(max_length=200, description="remarks")] = ()
@@ -93,13 +94,13 @@ class CastRecord(Table, frozen=True, kw_only=True):
     """One casting of one mould set. bench.html writes this file."""
 
     format: Annotated[Literal["unitcad cast record"], Meta(description="kind of file")]
-    version: Annotated[int, Meta(ge=1, le=1, description="version of the format")]
+    version: Annotated[int, between(1, 1, "version of the format")]
     spec_name: Annotated[Text, Meta(description="name of the spec")]
     spec_hash: Annotated[Text, Meta(description="twelve digits at the end of the result's folder")]
     cast_on: Annotated[Text, Meta(description="day of the first pour: 2026-03-14")]
     label: Annotated[Text | None, Meta(description="four characters, as engraved on the moulds")] = None
     spec: Annotated[dict[str, Any] | None, Meta(description="the whole spec with its defaults")] = None
-    room_c: Annotated[Annotated[float, Meta(ge=-20, le=80)] | None, Meta(description="temperature of the room")] = None
+    room_c: Annotated[Annotated[float, between(-20, 80)] | None, Meta(description="temperature of the room")] = None
     scale_resolution_g: Annotated[Resolution | None, Meta(description="smallest step of the scale")] = None
     caliper_resolution_mm: Annotated[Resolution | None, Meta(description="smallest step of the caliper")] = None
     pours: Annotated[tuple[CastPour, ...], Meta(max_length=99)] = ()

@@ -19,83 +19,52 @@ FREQUENCIES_HZ = (1.0, 5000.0)
 LONGEST_MM = 1000.0
 """Beyond a metre nothing here is printed or cast."""
 
+
+def between(low: float, high: float, about: str | None = None) -> Meta:
+    """Return the limits of a number, which it may reach, and its description."""
+    return Meta(ge=low, le=high, description=about)
+
+
 Source = Annotated[str, Meta(min_length=1, max_length=500)]
-Shore = Annotated[str, Meta(min_length=1, max_length=20, description="hardness on the data sheet")]
 Drive = Annotated[
     Literal["flat", "axial"],
     Meta(description="direction of the force: flat, in the can's plane (ERM), or axial, along its axis (coin LRA)"),
 ]
-Support = Annotated[Literal["printed", "none"], Meta(description="printed: under overhangs; none: an overhang fails")]
-Technology = Annotated[Literal["fdm", "sla"], Meta(description="fdm: molten filament; sla: cured resin")]
-Density = Annotated[float, Meta(ge=0.1, le=25, description="density of the cured silicone")]
-Viscosity = Annotated[float, Meta(ge=1, le=1e8, description="viscosity of both parts mixed")]
-PotLife = Annotated[float, Meta(ge=0.1, le=1e5, description="time from mixing until the mix no longer flows")]
-Cure = Annotated[float, Meta(ge=0.01, le=1e4, description="time from pouring until demoulding")]
-StaticModulus = Annotated[float, Meta(ge=0.1, le=1e6, description="stress at 100 % strain, slowly pulled")]
-Tensile = Annotated[float, Meta(ge=0.001, le=1000, description="tensile strength")]
-Elongation = Annotated[float, Meta(ge=1, le=5000, description="elongation at break")]
-CastingFloor = Annotated[float, Meta(ge=0.01, le=100, description="thinnest wall that pours and demoulds")]
-Shrinkage = Annotated[float, Meta(ge=0, le=5, description="linear shrinkage of the cured silicone, %")]
-Poisson = Annotated[float, Meta(ge=0, le=0.5, description="Poisson's ratio; 0.5: incompressible")]
-LossFactor = Annotated[float, Meta(ge=0, le=10, description="tan delta at the motor's frequency")]
-MixRatio = Annotated[float, Meta(ge=0.001, le=1000, description="parts A to one part B")]
-Young = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus at small strain and the motor's frequency")]
-QuasistaticYoung = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus of a slow pull")]
-FractionalModulus = Annotated[float, Meta(ge=0.01, le=1e8, description="static shear modulus of a fractional law")]
-FractionalTime = Annotated[float, Meta(ge=0, le=1e9, description="time constant of a fractional law")]
-FractionalOrder = Annotated[float, Meta(ge=0, le=1, description="order of a fractional law")]
+Shrinkage = Annotated[float, between(0, 5, "linear shrinkage of the cured silicone, %")]
+Poisson = Annotated[float, between(0, 0.5, "Poisson's ratio; 0.5: incompressible")]
+LossFactor = Annotated[float, between(0, 10, "tan delta at the motor's frequency")]
+Young = Annotated[float, between(0.01, 1e8, "Young's modulus at small strain and the motor's frequency")]
 
-MotorDiameter = Annotated[float, Meta(ge=1, le=LONGEST_MM, description="diameter of the motor's can")]
-MotorThickness = Annotated[float, Meta(ge=0.5, le=100, description="thickness of the motor's can")]
-MotorMass = Annotated[float, Meta(ge=0.001, le=1e4, description="mass of the motor")]
-Frequency = Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1], description="frequency of the drive")]
-Amplitude = Annotated[float, Meta(ge=0.001, le=1e5, description="amplitude of the motor")]
-Speed = Annotated[
-    float, Meta(ge=60 * FREQUENCIES_HZ[0], le=60 * FREQUENCIES_HZ[1], description="speed at the rated voltage")
-]
-Voltage = Annotated[float, Meta(ge=0.01, le=1000, description="rated voltage")]
-Current = Annotated[float, Meta(ge=0.01, le=1e5, description="current at the rated voltage")]
-Acceleration = Annotated[float, Meta(ge=0.001, le=1000, description="acceleration of the maker's test mass")]
+MotorDiameter = Annotated[float, between(1, LONGEST_MM, "diameter of the motor's can")]
+MotorThickness = Annotated[float, between(0.5, 100, "thickness of the motor's can")]
+Frequency = Annotated[float, between(FREQUENCIES_HZ[0], FREQUENCIES_HZ[1], "frequency of the drive")]
+Amplitude = Annotated[float, between(0.001, 1e5, "amplitude of the motor")]
 
-Bed = Annotated[float, Meta(ge=20, le=LONGEST_MM, description="side of the printer's build volume")]
-LayerHeight = Annotated[float, Meta(ge=0.005, le=2, description="height of a printed layer")]
-Play = Annotated[float, Meta(ge=0, le=2, description="position error of the printer's axes, per side")]
-PlinthClearance = Annotated[float, Meta(ge=0.01, le=2, description="gap between a cup and its plinth, per side")]
-RibInterference = Annotated[
-    float, Meta(ge=0, le=2, description="interference of a cup's ribs with its plinth, per side; 0: no ribs")
-]
-SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="gap between a cup's foot and the plate")]
-SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="height of the slot for a tail or wires")]
-SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="extra width of the slot, over tail or wires")]
-Nozzle = Annotated[float, Meta(ge=0.1, le=2, description="bore of the nozzle, of a printer of filament")]
+Bed = Annotated[float, between(20, LONGEST_MM, "side of the printer's build volume")]
+LayerHeight = Annotated[float, between(0.005, 2, "height of a printed layer")]
+Play = Annotated[float, between(0, 2, "position error of the printer's axes, per side")]
+PlinthClearance = Annotated[float, between(0.01, 2, "gap between a cup and its plinth, per side")]
+RibInterference = Annotated[float, between(0, 2, "interference of a cup's ribs with its plinth, per side; 0: no ribs")]
+SeatRelief = Annotated[float, between(0.01, 20, "gap between a cup's foot and the plate")]
+SlotHeight = Annotated[float, between(0.05, 25, "height of the slot for a tail or wires")]
+SlotClearance = Annotated[float, between(0.01, 20, "extra width of the slot, over tail or wires")]
 BoreCompensation = Annotated[
     float,
-    Meta(ge=0, le=0.5, description="by how much bores are printed too narrow, per side; files make up for it"),
+    between(0, 0.5, "by how much bores are printed too narrow, per side; files make up for it"),
 ]
-WindowClearance = Annotated[
-    float, Meta(ge=0.01, le=5, description="gap between the tongue and a cup's window, per side")
-]
-Wall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that prints whole")]
-FlatWall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that prints flat on the bed")]
-Feature = Annotated[float, Meta(ge=0.05, le=20, description="smallest width of a rib, a groove or a stroke")]
-Skirt = Annotated[float, Meta(ge=0.05, le=50, description="wall of a cup around its plinth")]
-Land = Annotated[float, Meta(ge=0.05, le=50, description="width of the rim around a cavity")]
-GrooveWidth = Annotated[float, Meta(ge=0.05, le=50, description="width of the overflow groove")]
-GrooveDepth = Annotated[float, Meta(ge=0.05, le=50, description="depth of the overflow groove")]
-FilamentHole = Annotated[float, Meta(ge=0.1, le=20, description="diameter of the core's hole for the filament")]
-EngravingDepth = Annotated[float, Meta(ge=0.01, le=10, description="depth of the lettering")]
-EngravingStroke = Annotated[float, Meta(ge=0.05, le=10, description="width of the lettering's strokes")]
-Overhang = Annotated[float, Meta(ge=0, le=90, description="largest lean from the vertical that prints without support")]
-Bridge = Annotated[float, Meta(ge=0, le=LONGEST_MM, description="longest bridge that prints without support")]
+WindowClearance = Annotated[float, between(0.01, 5, "gap between the tongue and a cup's window, per side")]
+Wall = Annotated[float, between(0.05, 50, "thinnest wall that prints whole")]
+Skirt = Annotated[float, between(0.05, 50, "wall of a cup around its plinth")]
+Land = Annotated[float, between(0.05, 50, "width of the rim around a cavity")]
+GrooveWidth = Annotated[float, between(0.05, 50, "width of the overflow groove")]
+GrooveDepth = Annotated[float, between(0.05, 50, "depth of the overflow groove")]
+FilamentHole = Annotated[float, between(0.1, 20, "diameter of the core's hole for the filament")]
+EngravingDepth = Annotated[float, between(0.01, 10, "depth of the lettering")]
+EngravingStroke = Annotated[float, between(0.05, 10, "width of the lettering's strokes")]
 
-TissueDensity = Annotated[float, Meta(ge=1, le=25000, description="density of the tissue")]
-TissueThickness = Annotated[
-    float, Meta(ge=0.001, le=1e4, description="thickness of the layer; the last layer has none")
-]
 TissueModulus = Annotated[
-    float, Meta(ge=0.001, le=1e9, description="modulus at small strain; a shear modulus overrides Young's modulus")
+    float, between(0.001, 1e9, "modulus at small strain; a shear modulus overrides Young's modulus")
 ]
-TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="viscosity in shear; it overrides the loss factor")]
 
 
 class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defaults=True, forbid_unknown_fields=True):
@@ -128,24 +97,26 @@ class Material(Struct, frozen=True, kw_only=True):
     """
 
     name: str
-    density_g_cm3: Value[Density]
-    mixed_viscosity_cps: Value[Viscosity]
-    pot_life_min: Value[PotLife]
-    cure_h: Value[Cure]
-    shore: Value[Shore]
-    modulus_100pct_kpa: Value[StaticModulus]
-    tensile_mpa: Value[Tensile]
-    elongation_pct: Value[Elongation]
-    casting_floor_mm: Value[CastingFloor]
+    density_g_cm3: Value[Annotated[float, between(0.1, 25, "density of the cured silicone")]]
+    mixed_viscosity_cps: Value[Annotated[float, between(1, 1e8, "viscosity of both parts mixed")]]
+    pot_life_min: Value[Annotated[float, between(0.1, 1e5, "time from mixing until the mix no longer flows")]]
+    cure_h: Value[Annotated[float, between(0.01, 1e4, "time from pouring until demoulding")]]
+    shore: Value[Annotated[str, Meta(min_length=1, max_length=20, description="hardness on the data sheet")]]
+    modulus_100pct_kpa: Value[Annotated[float, between(0.1, 1e6, "stress at 100 % strain, slowly pulled")]]
+    tensile_mpa: Value[Annotated[float, between(0.001, 1000, "tensile strength")]]
+    elongation_pct: Value[Annotated[float, between(1, 5000, "elongation at break")]]
+    casting_floor_mm: Value[Annotated[float, between(0.01, 100, "thinnest wall that pours and demoulds")]]
     poisson_ratio: Value[Poisson]
     loss_factor: Value[LossFactor]
-    mix_ratio: Value[MixRatio]
+    mix_ratio: Value[Annotated[float, between(0.001, 1000, "parts A to one part B")]]
     shrinkage_percent: Value[Shrinkage] | None = None
     youngs_modulus_kpa: Value[Young] | None = None
-    quasistatic_modulus_kpa: Value[QuasistaticYoung] | None = None
-    fractional_mu0_kpa: Value[FractionalModulus] | None = None
-    fractional_tau_us: Value[FractionalTime] | None = None
-    fractional_n: Value[FractionalOrder] | None = None
+    quasistatic_modulus_kpa: Value[Annotated[float, between(0.01, 1e8, "Young's modulus of a slow pull")]] | None = None
+    fractional_mu0_kpa: (
+        Value[Annotated[float, between(0.01, 1e8, "static shear modulus of a fractional law")]] | None
+    ) = None
+    fractional_tau_us: Value[Annotated[float, between(0, 1e9, "time constant of a fractional law")]] | None = None
+    fractional_n: Value[Annotated[float, between(0, 1, "order of a fractional law")]] | None = None
 
 
 class Motor(Struct, frozen=True, kw_only=True):
@@ -155,20 +126,23 @@ class Motor(Struct, frozen=True, kw_only=True):
     diameter_mm: Value[MotorDiameter]
     thickness_mm: Value[MotorThickness]
     drive: Value[Drive] | None = None
-    mass_g: Value[MotorMass] | None = None
+    mass_g: Value[Annotated[float, between(0.001, 1e4, "mass of the motor")]] | None = None
     frequency_hz: Value[Frequency] | None = None
     amplitude_um: Value[Amplitude] | None = None
-    rpm: Value[Speed] | None = None
-    voltage_v: Value[Voltage] | None = None
-    current_ma: Value[Current] | None = None
-    acceleration_g: Value[Acceleration] | None = None
+    rpm: (
+        Value[Annotated[float, between(60 * FREQUENCIES_HZ[0], 60 * FREQUENCIES_HZ[1], "speed at the rated voltage")]]
+        | None
+    ) = None
+    voltage_v: Value[Annotated[float, between(0.01, 1000, "rated voltage")]] | None = None
+    current_ma: Value[Annotated[float, between(0.01, 1e5, "current at the rated voltage")]] | None = None
+    acceleration_g: Value[Annotated[float, between(0.001, 1000, "acceleration of the maker's test mass")]] | None = None
 
 
 class Printer(Struct, frozen=True, kw_only=True):
     """A printer: its capability and the clearances that follow from it; all lengths mm, clearances per side."""
 
     name: str
-    technology: Value[Technology]
+    technology: Value[Annotated[Literal["fdm", "sla"], Meta(description="fdm: molten filament; sla: cured resin")]]
     bed_x_mm: Value[Bed]
     bed_y_mm: Value[Bed]
     bed_z_mm: Value[Bed]
@@ -180,8 +154,8 @@ class Printer(Struct, frozen=True, kw_only=True):
     slot_width_clearance_mm: Value[SlotClearance]
     window_clearance_mm: Value[WindowClearance]
     least_wall_mm: Value[Wall]
-    least_flat_wall_mm: Value[FlatWall]
-    least_feature_mm: Value[Feature]
+    least_flat_wall_mm: Value[Annotated[float, between(0.05, 50, "thinnest wall that prints flat on the bed")]]
+    least_feature_mm: Value[Annotated[float, between(0.05, 20, "smallest width of a rib, a groove or a stroke")]]
     skirt_wall_mm: Value[Skirt]
     land_mm: Value[Land]
     groove_width_mm: Value[GrooveWidth]
@@ -189,25 +163,34 @@ class Printer(Struct, frozen=True, kw_only=True):
     filament_hole_mm: Value[FilamentHole]
     engraving_depth_mm: Value[EngravingDepth]
     engraving_stroke_mm: Value[EngravingStroke]
-    overhang_deg: Value[Overhang]
-    bridge_mm: Value[Bridge]
-    nozzle_mm: Value[Nozzle] | None = None
+    overhang_deg: Value[Annotated[float, between(0, 90, "largest lean from the vertical that prints without support")]]
+    bridge_mm: Value[Annotated[float, between(0, LONGEST_MM, "longest bridge that prints without support")]]
+    nozzle_mm: Value[Annotated[float, between(0.1, 2, "bore of the nozzle, of a printer of filament")]] | None = None
     rib_interference_mm: Value[RibInterference] | None = None
     bore_compensation_mm: Value[BoreCompensation] | None = None
-    support: Value[Support] | None = None
+    support: (
+        Value[
+            Annotated[Literal["printed", "none"], Meta(description="printed: under overhangs; none: an overhang fails")]
+        ]
+        | None
+    ) = None
 
 
 class Tissue(Struct, frozen=True, kw_only=True):
     """One layer of the tissue under the unit, skin first; no `thickness_mm` means a half-space."""
 
     name: str
-    density_kg_m3: Value[TissueDensity]
+    density_kg_m3: Value[Annotated[float, between(1, 25000, "density of the tissue")]]
     poisson_ratio: Value[Poisson]
-    thickness_mm: Value[TissueThickness] | None = None
+    thickness_mm: (
+        Value[Annotated[float, between(0.001, 1e4, "thickness of the layer; the last layer has none")]] | None
+    ) = None
     youngs_modulus_kpa: Value[TissueModulus] | None = None
     shear_modulus_kpa: Value[TissueModulus] | None = None
     loss_factor: Value[LossFactor] | None = None
-    viscosity_pa_s: Value[TissueViscosity] | None = None
+    viscosity_pa_s: (
+        Value[Annotated[float, between(0, 1e6, "viscosity in shear; it overrides the loss factor")]] | None
+    ) = None
 
 
 @cache

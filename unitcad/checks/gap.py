@@ -25,7 +25,7 @@ from unitcad.moulds.cup import PIN_RADIUS, Pins
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
-from unitcad.spec.resolved import Moulds
+from unitcad.spec.raw import MouldsTable
 from unitcad.text import number
 
 KNIFE = (
@@ -90,7 +90,7 @@ def _on_pins(moulds: MouldSet, name: str, piece: Manifold, base: Manifold, pins:
     return at_least("C210", f"{name} holes and pins", gap, limit, "mm", too_tight(lengths))
 
 
-def least_play(lengths: Moulds) -> float:
+def least_play(lengths: MouldsTable) -> float:
     """Return the clearance of pieces without ribs, mm: that of the spec, or the printer's own play if larger."""
     return max(lengths.plinth_clearance_mm, lengths.xy_play_mm)
 
@@ -104,7 +104,7 @@ def play_missing(moulds: MouldSet) -> list[str]:
     return [f"{too_tight(lengths)}, or the pieces do not go together ({' and '.join(codes)})"]
 
 
-def too_tight(lengths: Moulds) -> str:
+def too_tight(lengths: MouldsTable) -> str:
     """Write the remedy for pieces with less than `least_play` between them."""
     asked, play = lengths.plinth_clearance_mm, lengths.xy_play_mm
     if asked >= play:

@@ -9,7 +9,6 @@ import time
 import tomllib
 from collections.abc import Container, Iterable, Iterator
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -117,11 +116,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
     yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
-    checks, check = manifest["mould_checks"], manifest["check"]
-    if checks:
-        passed = sum(entry["ok"] for entry in checks)
-        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
-        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+    yield from checks_line(manifest)
     if level := manifest["estimate"]:
         yield from level["lines"]
     yield from to_open(built.folder)
@@ -133,6 +128,15 @@ def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[
         lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, how in assumed.items())
         yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
         yield f"measure first; assumed: {lengths}{yours}"
+
+
+def checks_line(manifest: Manifest) -> Iterator[str]:
+    """Yield a line of the mould checks and of the faults in files, if they were checked."""
+    checks, check = manifest["mould_checks"], manifest["check"]
+    if checks:
+        passed = sum(entry["ok"] for entry in checks)
+        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
+        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
 
 
 def to_open(folder: Path) -> Iterator[str]:
@@ -183,7 +187,46 @@ def build(
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
     expect_commas("SPEC", specs)
     specs = [confirm_known(spec) for spec in specs]
-    once = partial(_build_all, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
+    drawn = only is None or not {"unit", "moulds"}.isdisjoint(names_in(only))
+    if drawn and (formats is None or "step" in names_in(formats)):
+        step_helper.start()  # first: it loads its modules while this process loads its own
+    paged = only is None if page is None else page
+    changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
+    allow_code(code)
+
+    def once() -> bool:
+        """Build the specs and print the results; return whether every check passed."""
+        # Every spec is validated before the first one is built.
+        wanted = [(load_subject(spec, changes, chosen), _given_paths(spec, changes)) for spec in specs]
+        for spec, _ in wanted if slicing else ():
+            load("unitcad.export.slicer:check_slicing")(spec.unit, chosen)
+        results: list[Built] = []
+        printing: list[str] = []
+        for spec, given in wanted:
+            with progress(spec.name) as say:
+                result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say, given=given)
+                if slicing:
+                    say("slicing")
+                    slice_tools = load("unitcad.export.slicer:slice_tools")
+                    with hold_folder(result.folder):
+                        printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
+                if paged or (result.folder / PAGE).is_file():
+                    say("page")
+                    with hold_folder(result.folder):
+                        write_report(result.folder, warn)
+            results.append(result)
+        if as_json:
+            print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
+        else:
+            for i, ((spec, given), result) in enumerate(zip(wanted, results, strict=True)):
+                _print_faults(result.manifest)
+                # Standard output has the folder alone, for a script to take.
+                lines = [*_summary(spec, result, given), *printing[i : i + 1]]
+                for line in sorted(lines, key=lambda line: line.startswith("open ")):  # what to open comes last
+                    warn(f"{spec.name}: {line}")
+                typer.echo(str(result.folder))
+        return all(result.ok for result in results)
+
     if not watch:
         if not once():
             sys.exit(1)
@@ -199,60 +242,6 @@ def build(
             except UnitcadError as error:
                 say_error(error, "object" if as_json else "text")
             warn("waiting for a save; Ctrl-C ends")
-
-
-def _build_all(
-    specs: list[str],
-    out: Path,
-    fit: Path | None,
-    sets: list[str] | None,
-    formats: str | None,
-    only: str | None,
-    page: bool | None,
-    no_check: bool,
-    slicing: bool,
-    code: bool,
-    as_json: bool,
-) -> bool:
-    """Build the specs and print the results; return whether every check passed."""
-
-    outputs_asked = {"unit", "moulds"} if only is None else set(names_in(only))
-    if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in names_in(formats)):
-        step_helper.start()  # first: it loads its modules while this process loads its own
-    paged = only is None if page is None else page
-    changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
-    allow_code(code)
-    # Every spec is validated before the first one is built.
-    wanted = [load_subject(spec, changes, chosen) for spec in specs]
-    given = [_given_paths(spec, changes) for spec in specs]
-    for spec in wanted if slicing else ():
-        load("unitcad.export.slicer:check_slicing")(spec.unit, chosen)
-    results: list[Built] = []
-    printing: list[str] = []
-    for spec, known in zip(wanted, given, strict=True):
-        with progress(spec.name) as say:
-            result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say, given=known)
-            if slicing:
-                say("slicing")
-                with hold_folder(result.folder):
-                    sliced = load("unitcad.export.slicer:slice_tools")(spec.unit, result.folder, result.manifest, say)
-                printing.append(sliced)
-            if paged or (result.folder / PAGE).is_file():
-                say("page")
-                with hold_folder(result.folder):
-                    write_report(result.folder, warn)
-        results.append(result)
-    if as_json:
-        print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
-    else:
-        for i, (spec, result) in enumerate(zip(wanted, results, strict=True)):
-            _print_faults(result.manifest)
-            # Standard output has the folder alone, for a script to take.
-            lines = [*_summary(spec, result, given[i]), *printing[i : i + 1]]
-            for line in sorted(lines, key=lambda line: line.startswith("open ")):  # what to open comes last
-                warn(f"{spec.name}: {line}")
-            typer.echo(str(result.folder))
-    return all(result.ok for result in results)
 
 
 def _given_paths(source: str, changes: list[str]) -> frozenset[str]:

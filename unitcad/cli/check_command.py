@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
@@ -29,7 +29,7 @@ from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
 from unitcad.meshcheck.findings import MOST, SHOWN
 from unitcad.meshcheck.output import FORMATS, render
-from unitcad.meshcheck.rules.registry import check_prefixes, rules
+from unitcad.meshcheck.rules.registry import check_prefixes
 from unitcad.meshcheck.rules.registry import explain as explanation
 from unitcad.meshcheck.rules.s_scale import unit_named
 from unitcad.rooms import expect_none_but, load
@@ -57,11 +57,10 @@ class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, re
 NAMES = ("unitcad.toml", "pyproject.toml")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Configuration:
+class Configuration(Struct, frozen=True, kw_only=True):
     """Settings with the file they come from, None for none, and the table's name there."""
 
-    settings: Settings | None = None
+    settings: Settings = Settings()
     path: Path | None = None
     table: str = ""
 
@@ -71,11 +70,7 @@ class Configuration:
 
     def chosen(self, key: str, given: Any) -> tuple[str, Any]:
         """Return an option's name and the value `given` to it; without one, the name and the value of its setting."""
-        return (f"--{key}", given) if given is not None else (self.name(key), self.value(key))
-
-    def value(self, key: str) -> Any:
-        """Return the value of a setting, None without a file."""
-        return getattr(self.settings, key, None)
+        return (f"--{key}", given) if given is not None else (self.name(key), getattr(self.settings, key))
 
     @property
     def shown(self) -> str | None:
@@ -85,13 +80,13 @@ class Configuration:
     @property
     def baseline(self) -> Path | None:
         """Path of the baseline, which the file gives from its own folder."""
-        if self.path is None or self.value("baseline") is None:
+        if self.path is None or self.settings.baseline is None:
             return None
-        return Path(path_seen_from(self.path.parent / self.value("baseline")))
+        return Path(path_seen_from(self.path.parent / self.settings.baseline))
 
     def ignored(self, path: str) -> list[str]:
         """Return prefixes of codes that per-file-ignores drops for a file; patterns start at the settings' folder."""
-        if self.path is None or self.settings is None:
+        if self.path is None:
             return []
         below = path_seen_from(path, self.path.parent)
         return [
@@ -103,8 +98,7 @@ class Configuration:
 
         Patterns start at the folder of the settings, and those given at the working directory.
         """
-        set_here = [] if self.path is None or self.settings is None else self.settings.exclude
-        sets = [(Path.cwd() if self.path is None else self.path.parent, set_here), (Path.cwd(), given)]
+        sets = [(Path.cwd() if self.path is None else self.path.parent, self.settings.exclude), (Path.cwd(), given)]
 
         def named(path: str) -> bool:
             for folder, patterns in sets:
@@ -172,16 +166,10 @@ def _read(path: Path) -> Configuration | None:
             return None
         from unitcad.spec.convert import convert
 
-        settings = convert(_mapping(table, data[last]), Settings, table)
+        settings = convert(data[last], Settings, table)
     except Refusal as error:
         raise Refusal(f"{shown}: {error.field}", error.value, error.limit, error.nearest) from None
     return Configuration(settings=settings, path=path.absolute(), table=table)
-
-
-def _mapping(table: str, data: Any) -> Mapping[str, Any]:
-    if isinstance(data, Mapping):
-        return data
-    raise Refusal(table, data, "takes a table")
 
 
 def check(
@@ -282,15 +270,11 @@ def check(
         list[str] | None,
         typer.Option(metavar="CODES", help="Explain mesh rules and mould checks (C...). No file is checked."),
     ] = None,
-    list_rules: Annotated[bool, typer.Option("--list-rules", help="List all rules.")] = False,
 ) -> None:
     """Check mesh files as they are, before any repair.
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP if an extra with a B-rep kernel is installed.
     """
-    if list_rules:
-        sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
-        return
     if explain is not None:
         sys.stdout.write(_explained([part.strip() for part in ",".join(explain).split(",")]) + "\n")
         return
@@ -304,7 +288,8 @@ def check(
         raise Refusal("--pictures", pictures, "must name a folder; this is a file")
     copies = [_copy(given, FORMATS) for given in report or []]
     configuration = find(config, wanted=not no_config)
-    level = fail_on or configuration.value("fail_on") or "error"
+    settings = configuration.settings
+    level = fail_on or settings.fail_on or "error"
     if level not in ("error", "warning"):
         raise unknown_name("--fail-on", level, ("error", "warning"))
     base = Path(baseline) if baseline is not None else configuration.baseline
@@ -320,9 +305,9 @@ def check(
         unit=unit_named(*configuration.chosen("unit", unit)),
         printer=_printer(*configuration.chosen("printer", printer)),
         shells=shells,
-        strict=bool(configuration.value("strict") if strict is None else strict),
-        strict_3mf=bool(configuration.value("strict_3mf") if strict_3mf is None else strict_3mf),
-        limits=_limits(max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", timeout)),
+        strict=bool(settings.strict if strict is None else strict),
+        strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
+        limits=_limits(max_faces or settings.max_faces, *configuration.chosen("timeout", timeout)),
         locations=MOST if all_locations or base is not None or pictures is not None else SHOWN,
         draw=pictures is not None,
     )
@@ -333,12 +318,10 @@ def check(
         raise UnitcadError(
             "FILE...: is required: mesh files, folders or globs, or --manifest; see unitcad check --help"
         )
-    for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
+    for pattern, codes in settings.per_file_ignores.items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
-    draw = None
-    if pictures is not None:
-        draw = partial(finding_pictures.write, Path(pictures))
-    memory = memory or configuration.value("memory") or 8000
+    draw = None if pictures is None else partial(finding_pictures.write, Path(pictures))
+    memory = memory or settings.memory or 8000
     check_all = partial(file_checks.check_files, jobs=jobs, memory_mb=memory, then=draw)
     left_out = configuration.left_out(exclude or [])
     paths, unread = file_checks.expand(files or [], left_out)
@@ -412,10 +395,7 @@ def _write(text: str, *, plain: bool) -> None:
 
 
 def _printer(field: str, name: str | None) -> Printer | None:
-    if not name:
-        return None
-
-    return catalogue.choose(field, name, catalogue.printers())
+    return catalogue.choose(field, name, catalogue.printers()) if name else None
 
 
 def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:

@@ -7,10 +7,11 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 from rich.console import Console
+from rich.table import Column, Table
 from rich.text import Text
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
@@ -95,6 +96,21 @@ def console(stderr: bool = False) -> Console:
     if not made.is_terminal:
         made.width = _NO_TERMINAL
     return made
+
+
+def print_table(rows: Sequence[Mapping[str, str]], title: str = "") -> None:
+    """Print a row a line; the keys of a row are the heads of the columns."""
+    if rows:
+        table = Table(*(Column(head, no_wrap=i == 0) for i, head in enumerate(rows[0])), title=title or None)
+        for row in rows:
+            table.add_row(*row.values())
+        console().print(table)
+
+
+def print_indented(*lines: str) -> None:
+    """Print each line below its head or its table."""
+    for line in lines:
+        console().print(f"  {line}", soft_wrap=True)
 
 
 _NO_TERMINAL = 10_000

@@ -58,7 +58,7 @@ def shipped() -> dict[str, Design]:
     return {module.DESIGN.name: module.DESIGN for module in modules if hasattr(module, "DESIGN")}
 
 
-def design_of(spec: Spec | RawSpec) -> Design:
+def design_of(spec: RawSpec) -> Design:
     """Return the design of a spec. Raises Refusal for an unknown one, UnitcadError for a custom one that fails."""
     if is_custom(spec.design):
         return custom(spec.design, spec.design_source or "")

@@ -18,8 +18,7 @@ from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Outline, Pad
 from unitcad.shape import Revolve, Shape, box, cut, cylinder, moved, polygon, turned, union
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec
-from unitcad.spec.raw import RawSpec
-from unitcad.spec.resolved import Circuit, Wires
+from unitcad.spec.raw import FpcbTable, RawSpec, WiresTable
 from unitcad.text import number
 
 Reason = tuple[str, str]
@@ -186,14 +185,14 @@ def bond(what: str, where: str) -> str:
     return f"Coat {what} thinly with {ADHESIVE} where it touches {where}: cast silicone does not bond to it."
 
 
-def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:
+def circuit(fpcb: FpcbTable, pad: Pad, dims: Dimensions) -> Shape:
     """Draw pad and tails of the flexible circuit. The tail starts inside the pad, so that the union has one outline."""
     half, reach = fpcb.tail_width_mm / 2, dims.outer_radius + fpcb.tail_length_mm
     tails = (box(min(0, s * reach), max(0, s * reach), -half, half, pad.low, pad.high) for s in dims.sides)
     return union((cylinder(pad.radius, pad.low, pad.high), *tails))
 
 
-def wires(drawn: Wires, across: tuple[float, ...], dims: Dimensions) -> list[Shape]:
+def wires(drawn: WiresTable, across: tuple[float, ...], dims: Dimensions) -> list[Shape]:
     """Draw the wires, from just off the motor's side out along +x, side by side, a gap below the core's top.
 
     `across`: y of their axes, mm.

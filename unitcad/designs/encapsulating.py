@@ -27,8 +27,7 @@ from unitcad.designs.limits import allowed_strain, pad_strain, tail_strain, wide
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec
-from unitcad.spec.raw import LEAST_TAIL
-from unitcad.spec.resolved import Circuit
+from unitcad.spec.raw import LEAST_TAIL, FpcbTable
 
 TIP_PROUD = 0.2
 """Height of a tongue for wires above the core, mm, so that Layer 1 clears them, before it moves to a layer."""
@@ -82,7 +81,7 @@ def check(spec: Spec, dims: Dimensions) -> None:
     limits.check_filament(spec, dims)
 
 
-def _check_circuit(spec: Spec, dims: Dimensions, fpcb: Circuit, exit: Exit) -> None:
+def _check_circuit(spec: Spec, dims: Dimensions, fpcb: FpcbTable, exit: Exit) -> None:
     tail, pad, end = fpcb.tail_width_mm, fpcb.pad_diameter_mm, fpcb.tail_end_width_mm
     widest = limits.widest_exit(spec, dims)
     clearance = spec.moulds.window_clearance_mm

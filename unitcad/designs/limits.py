@@ -20,7 +20,6 @@ from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Ex
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
 from unitcad.spec.raw import LEAST_LEDGE, FpcbTable, WiresTable
-from unitcad.spec.resolved import Circuit
 
 
 def allowed_strain(spec: Spec, known: Mapping[str, Material]) -> float:
@@ -35,17 +34,17 @@ def lip_strain(dims: Dimensions) -> float:
     return passing / dims.mouth_radius - 1
 
 
-def tail_strain(fpcb: Circuit, slot: Exit) -> float:
+def tail_strain(fpcb: FpcbTable, slot: Exit) -> float:
     """Return the strain of the slot's edge as the tail's free end passes: perimeter over perimeter, less one, or 0."""
     return max(0.0, 2 * (fpcb.tail_end_width_mm + fpcb.thickness_mm) / _round(slot) - 1)
 
 
-def pad_strain(fpcb: Circuit, slot: Exit) -> float:
+def pad_strain(fpcb: FpcbTable, slot: Exit) -> float:
     """Return the strain of the slot's edge if a pad of the circuit had to pass, as in `tail = "both"`."""
     return max(0.0, 2 * (fpcb.pad_diameter_mm + fpcb.thickness_mm) / _round(slot) - 1)
 
 
-def widest_tail_end(fpcb: Circuit, slot: Exit, strain: float) -> float:
+def widest_tail_end(fpcb: FpcbTable, slot: Exit, strain: float) -> float:
     """Return the widest free end of a tail, mm, that stretches the slot by no more than `strain`."""
     return _round(slot) * (1 + strain) / 2 - fpcb.thickness_mm
 
@@ -154,7 +153,7 @@ def check_wires(spec: Spec, dims: Dimensions) -> None:
         )
 
 
-def least_slot(fpcb: FpcbTable | Circuit | None, wires: WiresTable | None, wire_sides: int) -> float:
+def least_slot(fpcb: FpcbTable | None, wires: WiresTable | None, wire_sides: int) -> float:
     """Return the least height of the exit, mm; 0 if nothing leaves. `wire_sides`: see `Design`."""
     if wires:
         return wires.diameter_mm + SLOT_CLEARANCE * wire_sides

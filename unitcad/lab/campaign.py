@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.lab.chains import ChainTable, chains_of
@@ -22,13 +23,13 @@ from unitcad.spec.raw import Table
 from unitcad.validation.load import load_file
 
 Records = Annotated[tuple[File, ...], Meta(max_length=1000)]
-Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
-Column = Annotated[int, Meta(ge=1, le=4096)] | Name
-Rate = Annotated[float, Meta(ge=1, le=1e10)]
+Positive = Annotated[float, between(1e-12, 1e12)]
+Column = Annotated[int, between(1, 4096)] | Name
+Rate = Annotated[float, between(1, 1e10)]
 TimeUnit = Literal["s", "ms", "us", "ns"]
 Delimiter = Literal[",", ";", "\t", " "]
 DecimalSign = Literal[".", ","]
-SkippedLines = Annotated[int, Meta(ge=0, le=100000)]
+SkippedLines = Annotated[int, between(0, 100000)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):
@@ -95,7 +96,7 @@ class BlankTable(Table, frozen=True, kw_only=True):
 class PointTable(Table, frozen=True, kw_only=True):
     """Records at a distance from the unit's edge along the skin."""
 
-    distance_mm: Annotated[float, Meta(ge=0.01, le=1000, description="distance from the unit's edge along the skin")]
+    distance_mm: Annotated[float, between(0.01, 1000, "distance from the unit's edge along the skin")]
     records: Annotated[Records, Meta(description="records at this point")]
 
 

@@ -19,7 +19,8 @@ from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
-from unitcad.spec.toml import text_of, without_none
+from unitcad.spec.convert import without_none
+from unitcad.spec.toml import text_of
 
 FIT = "lab-fit.toml"
 DIFFERING = (

@@ -21,6 +21,7 @@ from unitcad.attenuation.inputs import TissueLayer, tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
 from unitcad.catalogue import entries as kinds
+from unitcad.catalogue.entries import between
 from unitcad.designs import layer_colour
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import tissue_layer
@@ -42,9 +43,9 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
     silicone: Annotated[str, Meta(description="tested silicone: ecoflex-00-10, ecoflex-00-30 or ecoflex-00-50")]
-    thinner_pct: Annotated[float, Meta(ge=0, le=100, description="thinner, in parts by weight to 100 of A and B")]
-    thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60, description="thickness of the layer")]
-    loss_factor: Annotated[float, Meta(ge=0.01, le=1, description="tan delta (assumed)")] = 0.2
+    thinner_pct: Annotated[float, between(0, 100, "thinner, in parts by weight to 100 of A and B")]
+    thickness_mm: Annotated[float, between(LEAST_LAYER, 60, "thickness of the layer")]
+    loss_factor: Annotated[float, between(0.01, 1, "tan delta (assumed)")] = 0.2
 
 
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -52,27 +53,25 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     name: Annotated[str, Meta(min_length=1, max_length=60, pattern=r"^[a-z0-9][a-z0-9-]*$", description=_NAME)]
     layers: Annotated[tuple[PhantomLayer, ...], Meta(min_length=1, max_length=6)]
-    unit_diameter_mm: Annotated[float, Meta(ge=4, le=40, description="diameter of the unit to measure")] = 14.0
-    motor_diameter_mm: Annotated[float, Meta(ge=2, le=40, description="diameter of its motor")] = 7.0
+    unit_diameter_mm: Annotated[float, between(4, 40, "diameter of the unit to measure")] = 14.0
+    motor_diameter_mm: Annotated[float, between(2, 40, "diameter of its motor")] = 7.0
     frequency_hz: kinds.Frequency = 125.0
     points_mm: Annotated[
-        tuple[Annotated[float, Meta(ge=0, le=60)], ...],
+        tuple[Annotated[float, between(0, 60)], ...],
         Meta(min_length=2, max_length=13, description="distances of the measuring points from the unit's edge"),
     ] = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
     inside_mm: Annotated[
-        Annotated[float, Meta(ge=40, le=400)] | None,
+        Annotated[float, between(40, 400)] | None,
         Meta(description="inner side of the box; default: the smallest with an echo below most_echo_pct"),
     ] = None
-    most_echo_pct: Annotated[
-        float, Meta(ge=0.5, le=50, description="largest echo of the walls at the last point, in percent")
-    ] = 5.0
-    plate_thickness_mm: Annotated[float, Meta(ge=2, le=20, description="thickness of the acrylic plate below")] = 5.0
-    stage_pitch_mm: Annotated[float, Meta(ge=5, le=50, description="pitch of the table's threaded holes")] = 25.0
-    stage_bolt_mm: Annotated[float, Meta(ge=2, le=12, description="thread of the table's holes")] = 6.0
+    most_echo_pct: Annotated[float, between(0.5, 50, "largest echo of the walls at the last point, in percent")] = 5.0
+    plate_thickness_mm: Annotated[float, between(2, 20, "thickness of the acrylic plate below")] = 5.0
+    stage_pitch_mm: Annotated[float, between(5, 50, "pitch of the table's threaded holes")] = 25.0
+    stage_bolt_mm: Annotated[float, between(2, 12, "thread of the table's holes")] = 6.0
     printer: Annotated[str, Meta(description="printer of the catalogue")] = "fdm-0.4"
-    waste: Annotated[float, Meta(ge=0, le=2, description="extra mix, as a fraction")] = 0.1
-    scale_resolution_g: Annotated[float, Meta(ge=1e-4, le=10, description="smallest step of the scale")] = 0.1
-    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
+    waste: Annotated[float, between(0, 2, "extra mix, as a fraction")] = 0.1
+    scale_resolution_g: Annotated[float, between(1e-4, 10, "smallest step of the scale")] = 0.1
+    room_c: Annotated[float, between(5, 45, "temperature of the room")] = 23.0
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:

@@ -25,8 +25,7 @@ from unitcad.shape.profile import FACETS
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, assumed_lengths, from_json, to_json, with_formats
 from unitcad.spec.custom_code import is_body_file
-from unitcad.spec.raw import CastingTable
-from unitcad.spec.resolved import Estimate
+from unitcad.spec.raw import CastingTable, EstimateTable
 from unitcad.text import join_words, number
 
 _T = TypeVar("_T")
@@ -40,7 +39,7 @@ def geometric(spec: Spec) -> Spec:
         motor=structs.replace(spec.motor, part=None, drive="flat"),
         layers=tuple(structs.replace(layer, material="") for layer in spec.layers),
         casting=CastingTable(),
-        estimate=Estimate(frequency_hz=0.0, amplitude_um=0.0, tissue="", models=()),
+        estimate=EstimateTable(frequency_hz=1.0, amplitude_um=1.0),
         materials={},
         motors={},
         tissue={},

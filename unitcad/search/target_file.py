@@ -24,6 +24,7 @@ from unitcad import catalogue
 from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
+from unitcad.catalogue.entries import between
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import read_text
@@ -33,18 +34,14 @@ from unitcad.validation.defaults import lab_fit
 from unitcad.validation.load import load_file
 
 MOST_PITCH_MM = 200.0
-Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
-Ratio = Annotated[
-    float, Meta(ge=1e-6, le=1, description="skin at a neighbour's middle, pitch_mm away, over that at the unit's edge")
-]
-Pitch = Annotated[float, Meta(ge=1, le=MOST_PITCH_MM, description="between the middles of two units")]
-CureHours = Annotated[
-    float, Meta(ge=0.01, le=1e5, description="from the first weighing until the unit is out of the mould")
-]
+Level = Annotated[float, between(0.001, 2, "of the motor's amplitude, at the unit's edge")]
+Ratio = Annotated[float, between(1e-6, 1, "skin at a neighbour's middle, pitch_mm away, over that at the unit's edge")]
+Pitch = Annotated[float, between(1, MOST_PITCH_MM, "between the middles of two units")]
+CureHours = Annotated[float, between(0.01, 1e5, "from the first weighing until the unit is out of the mould")]
 MOST_LAYERS = 2
-Layers = Annotated[int, Meta(ge=1, le=MOST_LAYERS, description="no unit of more was measured")]
-Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]
-Step = Annotated[float, Meta(ge=0.01, le=10)]
+Layers = Annotated[int, between(1, MOST_LAYERS, "no unit of more was measured")]
+Wall = Annotated[float, between(LEAST_LAYER, 20)]
+Step = Annotated[float, between(0.01, 10)]
 Name = Annotated[str, Meta(min_length=1, max_length=60)]
 _SPEC_KEYS = ("motor", "fpcb", "wires", "moulds", "casting", "output")
 MOST_GEOMETRIES = 20_000
@@ -58,9 +55,7 @@ class TargetTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         Level | None, Meta(description="largest level at the edge, as a fraction of the motor's amplitude")
     ] = None
     edge_min: Annotated[Level | None, Meta(description="smallest level at the edge, for a unit that amplifies")] = None
-    probability_min: Annotated[
-        float, Meta(ge=0.01, le=0.99, description="smallest probability of meeting the level")
-    ] = 0.5
+    probability_min: Annotated[float, between(0.01, 0.99, "smallest probability of meeting the level")] = 0.5
     crosstalk_ratio_max: Annotated[
         Ratio | None,
         Meta(
@@ -69,12 +64,12 @@ class TargetTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = None
     pitch_mm: Annotated[Pitch | None, Meta(description="distance between the middles of two units")] = None
     diameter_max_mm: Annotated[
-        Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)] | None, Meta(description="largest diameter")
+        Annotated[float, between(1, kinds.LONGEST_MM)] | None, Meta(description="largest diameter")
     ] = None
     height_max_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=kinds.LONGEST_MM)] | None, Meta(description="largest height")
+        Annotated[float, between(0.5, kinds.LONGEST_MM)] | None, Meta(description="largest height")
     ] = None
-    mass_max_g: Annotated[float, Meta(ge=0.01, le=1e4, description="largest mass of silicone and motor")] | None = None
+    mass_max_g: Annotated[float, between(0.01, 1e4, "largest mass of silicone and motor")] | None = None
     cure_hours_max: Annotated[
         CureHours | None, Meta(description="longest time from the first weighing until the unit is out of the mould")
     ] = None
@@ -98,8 +93,8 @@ class AtHandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         DEFAULT_MOTOR,
     )
     printer: Annotated[Name, Meta(description="printer of the catalogue")] = "fdm-0.4"
-    scale_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
-    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
+    scale_g: Annotated[float, between(1e-6, 1000, "smallest step of the scale")] = 0.01
+    room_c: Annotated[float, between(5, 45, "temperature of the room")] = 23.0
     vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
 
 

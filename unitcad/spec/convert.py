@@ -47,9 +47,11 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
     """Return `data`, the table at `field`, as a `kind`, types strict. Raises Refusal for the first unfit value.
 
     A number that is infinite, huge or none is refused at any place, and so is data that nests too deeply. A kind's
-    numbers have limits that they may reach (ge, le), so that a refusal can offer the limit.
+    numbers have limits that they may reach (ge, le), so that a refusal can offer the limit. A key whose value is None
+    counts as missing.
     """
     check_plain(data, field)
+    data = without_none(data)
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError:
@@ -60,6 +62,13 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
             limit = f"unknown key; {key} belongs above the first [table]"
             raise UnknownKey(refusal.field, refusal.value, limit) from None
         raise refusal from None
+
+
+def without_none(node: Any) -> Any:
+    """Return plain data without the keys whose value is None."""
+    if isinstance(node, Mapping):
+        return {key: without_none(value) for key, value in node.items() if value is not None}
+    return [without_none(value) for value in node] if isinstance(node, list | tuple) else node
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:

@@ -50,6 +50,11 @@ def is_value(kind: Any) -> bool:
     return not (table_in(kind) or named_in(kind) or table_in(entry_in(kind)))
 
 
+def takes_none(kind: Any) -> bool:
+    """Tell whether a resolved spec may lack a value of this kind."""
+    return type(None) in alternatives(kind)
+
+
 def entry_in(kind: Any, index: int = 0) -> Any:
     """Return the kind of entry `index` of a list that `kind` allows; None if it allows no list so long."""
     for member in alternatives(kind):
@@ -71,7 +76,7 @@ def index_in(step: str, count: int) -> int | None:
 def notes(kind: Any) -> Iterator[msgspec.Meta]:
     """Return the annotations of a kind and of the members of its unions."""
     if typing.get_origin(kind) is Annotated:
-        yield from kind.__metadata__
+        yield from reversed(kind.__metadata__)  # the outer ones first
         yield from notes(typing.get_args(kind)[0])
     elif typing.get_origin(kind) in _UNIONS:
         for member in typing.get_args(kind):

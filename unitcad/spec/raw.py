@@ -1,18 +1,22 @@
 """The tables of a spec as typed in a TOML file. Lengths in mm, the unit in each name.
 
-None means that the key is missing; `unitcad.spec.resolved` has the same spec with every value there. Only types and
-ranges of single values are checked here. The design and `validation` check conditions on several values.
+Validation works out the values that a file leaves out (`DERIVED`); a resolved spec (`unitcad.spec.resolved`) has the
+same tables with every value there. Only types and ranges of single values are checked here. The design and
+`validation` check conditions on several values.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
+from unitcad.catalogue.entries import between
 
+DERIVED: Any = None
+"""The default of a value that validation works out. Only a spec that is not resolved yet contains it."""
 DEFAULT_MOTOR = "LCM0720A3463F"
 """The motor of a spec that gives neither a part nor a size."""
 LEAST_LAYER = 0.5
@@ -21,12 +25,12 @@ LEAST_TAIL = 0.4
 """No circuit's tail is narrower (two traces), mm."""
 LEAST_LEDGE = 0.1
 """No ledge in the core is narrower, mm."""
-Length = Annotated[float, Meta(ge=0.1, le=kinds.LONGEST_MM)]
-Thickness = Annotated[float, Meta(ge=LEAST_LAYER, le=kinds.LONGEST_MM)]
-CircuitThickness = Annotated[float, Meta(ge=0.01, le=5)]
+Length = Annotated[float, between(0.1, kinds.LONGEST_MM)]
+Thickness = Annotated[float, between(LEAST_LAYER, kinds.LONGEST_MM)]
+CircuitThickness = Annotated[float, between(0.01, 5)]
 Cavities = Annotated[int, Meta(ge=1)]
-Vents = Annotated[int, Meta(ge=1, le=1000)]
-TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
+Vents = Annotated[int, between(1, 1000)]
+TailWidth = Annotated[float, between(LEAST_TAIL, kinds.LONGEST_MM)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb", "pdf"]
 FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb", "pdf")
 Output = Literal["unit", "moulds", "estimate", "casting"]
@@ -55,19 +59,17 @@ class MotorTable(Table, frozen=True, kw_only=True):
     part: Annotated[
         str | None, Meta(description="motor of the catalogue (unitcad list motors), or of the spec's own [motors.NAME]")
     ] = None
-    diameter_mm: Annotated[kinds.MotorDiameter | None, Meta(description="diameter of the can; default: the part's")] = (
-        None
+    diameter_mm: Annotated[kinds.MotorDiameter, Meta(description="diameter of the can; default: the part's")] = DERIVED
+    thickness_mm: Annotated[kinds.MotorThickness, Meta(description="thickness of the can; default: the part's")] = (
+        DERIVED
     )
-    thickness_mm: Annotated[
-        kinds.MotorThickness | None, Meta(description="thickness of the can; default: the part's")
-    ] = None
-    drive: kinds.Drive | None = None
+    drive: kinds.Drive = DERIVED
     fill: Annotated[bool, Meta(description="true: Layer 1 reaches the motor, without a ring of air between them")] = (
         False
     )
-    lip_mm: Annotated[
-        float, Meta(ge=0, le=10, description="reach of a lip of Layer 1 over the motor's edge at the skin; 0: none")
-    ] = 0.0
+    lip_mm: Annotated[float, between(0, 10, "reach of a lip of Layer 1 over the motor's edge at the skin; 0: none")] = (
+        0.0
+    )
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
@@ -89,12 +91,11 @@ class FpcbTable(Table, frozen=True, kw_only=True):
     ] = 3.0
     tail_length_mm: Annotated[Length, Meta(description="length of the tail outside the unit")] = 10.0
     pad_diameter_mm: Annotated[
-        Length | None, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
-    ] = None
+        Length, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
+    ] = DERIVED
     tail_end_width_mm: Annotated[
-        TailWidth | None,
-        Meta(description="width of the tail's free end, such as a connector, which must pass the slot"),
-    ] = None
+        TailWidth, Meta(description="width of the tail's free end, such as a connector, which must pass the slot")
+    ] = DERIVED
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
@@ -107,8 +108,8 @@ class WiresTable(Table, frozen=True, kw_only=True):
     2
     """
 
-    diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
-    count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
+    diameter_mm: Annotated[float, between(0.05, 20, "diameter of one wire with its insulation")]
+    count: Annotated[int, between(1, 8, "number of wires")] = 2
     length_mm: Annotated[Length, Meta(description="length of the wires outside the unit")] = 10.0
 
 
@@ -151,56 +152,52 @@ class MouldsTable(Table, frozen=True, kw_only=True):
         tuple[Cavities, Cavities] | Literal["fill"],
         Meta(description="columns and rows of cavities in one mould, or fill: as many as the bed takes"),
     ] = (1, 1)
-    bed_x_mm: kinds.Bed | None = None
-    bed_y_mm: kinds.Bed | None = None
-    bed_z_mm: kinds.Bed | None = None
-    layer_mm: kinds.LayerHeight | None = None
-    xy_play_mm: kinds.Play | None = None
-    plinth_clearance_mm: kinds.PlinthClearance | None = None
-    rib_interference_mm: kinds.RibInterference | None = None
-    bore_compensation_mm: kinds.BoreCompensation | None = None
-    seat_relief_mm: kinds.SeatRelief | None = None
-    slot_height_mm: kinds.SlotHeight | None = None
-    slot_width_clearance_mm: kinds.SlotClearance | None = None
-    window_clearance_mm: kinds.WindowClearance | None = None
-    least_wall_mm: kinds.Wall | None = None
-    skirt_wall_mm: kinds.Skirt | None = None
-    land_mm: kinds.Land | None = None
-    groove_width_mm: kinds.GrooveWidth | None = None
-    groove_depth_mm: kinds.GrooveDepth | None = None
-    filament_hole_mm: kinds.FilamentHole | None = None
-    engraving_depth_mm: kinds.EngravingDepth | None = None
-    engraving_stroke_mm: kinds.EngravingStroke | None = None
+    bed_x_mm: kinds.Bed = DERIVED
+    bed_y_mm: kinds.Bed = DERIVED
+    bed_z_mm: kinds.Bed = DERIVED
+    layer_mm: kinds.LayerHeight = DERIVED
+    xy_play_mm: kinds.Play = DERIVED
+    plinth_clearance_mm: kinds.PlinthClearance = DERIVED
+    rib_interference_mm: kinds.RibInterference = DERIVED
+    bore_compensation_mm: kinds.BoreCompensation = DERIVED
+    seat_relief_mm: kinds.SeatRelief = DERIVED
+    slot_height_mm: kinds.SlotHeight = DERIVED
+    slot_width_clearance_mm: kinds.SlotClearance = DERIVED
+    window_clearance_mm: kinds.WindowClearance = DERIVED
+    least_wall_mm: kinds.Wall = DERIVED
+    skirt_wall_mm: kinds.Skirt = DERIVED
+    land_mm: kinds.Land = DERIVED
+    groove_width_mm: kinds.GrooveWidth = DERIVED
+    groove_depth_mm: kinds.GrooveDepth = DERIVED
+    filament_hole_mm: kinds.FilamentHole = DERIVED
+    engraving_depth_mm: kinds.EngravingDepth = DERIVED
+    engraving_stroke_mm: kinds.EngravingStroke = DERIVED
     pour: Annotated[
         Literal["open", "injected"],
         Meta(description="open: struck off along the rim; injected: under a lid with sprue and vents"),
     ] = "open"
     sprue_mm: Annotated[
         float,
-        Meta(ge=3.0, le=50, description="diameter of the sprue of each cavity under a lid: 3 by syringe, 4 by gravity"),
+        between(3.0, 50, "diameter of the sprue of each cavity under a lid: 3 by syringe, 4 by gravity"),
     ] = 3.0
     vents: Annotated[
         Vents | None,
         Meta(description="number of vents of each cavity under a lid, in fours; default: as many as clear the air"),
     ] = None
-    filament_mm: Annotated[float, Meta(ge=0.2, le=20, description="diameter of the filament in the core")] = 1.75
+    filament_mm: Annotated[float, between(0.2, 20, "diameter of the filament in the core")] = 1.75
     plinth_height_mm: Annotated[
-        Annotated[float, Meta(ge=0.6, le=100)] | None,
-        Meta(description="height of the plinth; default: 2 mm in whole printed layers"),
-    ] = None
+        float, between(0.6, 100, "height of the plinth; default: 2 mm in whole printed layers")
+    ] = DERIVED
     plate_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=100)] | None,
-        Meta(description="thickness of the base's plate; default: 4 mm in whole printed layers"),
-    ] = None
-    ledge_mm: Annotated[
-        float, Meta(ge=LEAST_LEDGE, le=100, description="width of the core's ledge that carries the tongue")
-    ] = 0.6
+        float, between(0.5, 100, "thickness of the base's plate; default: 4 mm in whole printed layers")
+    ] = DERIVED
+    ledge_mm: Annotated[float, between(LEAST_LEDGE, 100, "width of the core's ledge that carries the tongue")] = 0.6
     shrinkage_percent: Annotated[
-        kinds.Shrinkage | None,
+        kinds.Shrinkage,
         Meta(description="linear shrinkage that the tools make up for, %; default: the largest of the silicones"),
-    ] = None
+    ] = DERIVED
     draft_deg: Annotated[
-        float, Meta(ge=0, le=3, description="taper of bores and core, narrower upwards: silicone comes off more easily")
+        float, between(0, 3, "taper of bores and core, narrower upwards: silicone comes off more easily")
     ] = 0.0
 
 
@@ -214,16 +211,14 @@ class CastingTable(Table, frozen=True, kw_only=True):
     False
     """
 
-    scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
-    minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6, description="smallest batch to mix")] = 2.0
-    waste: Annotated[float, Meta(ge=0, le=10, description="extra mix, as a fraction of the cavities' content")] = 0.5
-    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room, which sets pot life and cure")] = (
-        23.0
-    )
+    scale_resolution_g: Annotated[float, between(1e-6, 1000, "smallest step of the scale")] = 0.01
+    minimum_mix_g: Annotated[float, between(0.001, 1e6, "smallest batch to mix")] = 2.0
+    waste: Annotated[float, between(0, 10, "extra mix, as a fraction of the cavities' content")] = 0.5
+    room_c: Annotated[float, between(5, 45, "temperature of the room, which sets pot life and cure")] = 23.0
     vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
     strain_margin: Annotated[
         float,
-        Meta(ge=0.01, le=1, description="fraction of a silicone's elongation at break that demoulding may use"),
+        between(0.01, 1, "fraction of a silicone's elongation at break that demoulding may use"),
     ] = 0.5
 
 
@@ -237,12 +232,10 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     150.0
     """
 
-    frequency_hz: Annotated[
-        kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
-    ] = None
-    amplitude_um: Annotated[
-        kinds.Amplitude | None, Meta(description="amplitude of the motor; default: the motor's own")
-    ] = None
+    frequency_hz: Annotated[kinds.Frequency, Meta(description="frequency of the drive; default: the motor's")] = DERIVED
+    amplitude_um: Annotated[kinds.Amplitude, Meta(description="amplitude of the motor; default: the motor's own")] = (
+        DERIVED
+    )
     tissue: Annotated[
         str, Meta(description="tissue under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
     ] = "forearm"
@@ -270,12 +263,12 @@ class OutputTable(Table, frozen=True, kw_only=True):
     """
 
     formats: Annotated[
-        tuple[Format, ...] | None,
+        tuple[Format, ...],
         Meta(description="file formats; default: step, stl, 3mf, without a B-rep kernel stl, 3mf"),
-    ] = None
-    tolerance_mm: Annotated[
-        float, Meta(ge=0.0005, le=0.2, description="largest distance of a mesh from the true round surface")
-    ] = 0.01
+    ] = DERIVED
+    tolerance_mm: Annotated[float, between(0.0005, 0.2, "largest distance of a mesh from the true round surface")] = (
+        0.01
+    )
 
 
 class RawSpec(Table, frozen=True, kw_only=True):
@@ -287,10 +280,10 @@ class RawSpec(Table, frozen=True, kw_only=True):
     design: Annotated[
         str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
     ]
-    diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM, description="diameter of the unit")]
+    diameter_mm: Annotated[float, between(1, kinds.LONGEST_MM, "diameter of the unit")]
     skin_mm: Annotated[
         float,
-        Meta(ge=0, le=20, description="thickness of a film of the last layer's silicone over the skin side; 0: none"),
+        between(0, 20, "thickness of a film of the last layer's silicone over the skin side; 0: none"),
     ] = 0.0
     motor: Annotated[MotorTable | bool, Meta(description="the motor; false: none, for a custom design")] = MotorTable(
         part=DEFAULT_MOTOR

@@ -10,127 +10,45 @@ import inspect
 from collections.abc import Container
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from msgspec import Struct, structs
+from msgspec import UNSET, Struct, UnsetType, structs
 
 from unitcad import catalogue, text
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
-from unitcad.catalogue.entries import Drive
 from unitcad.errors import UnitcadError
 from unitcad.spec.raw import (
+    DERIVED,
     CastingTable,
     EstimateTable,
     Format,
     FpcbTable,
     LayerTable,
-    Model,
-    Moduli,
     MotorTable,
     MouldsTable,
     OutputTable,
     RawSpec,
-    Table,
     WiresTable,
 )
 from unitcad.text import number
 
-Casting = CastingTable
-Wires = WiresTable
 _MOST_LAYERS = 3
 """Layers that a spec's summary lists."""
 
 
-class MotorSize(Table, frozen=True, kw_only=True, omit_defaults=True):
-    """The motor's size and drive; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it.
+class MotorSize(MotorTable, frozen=True, kw_only=True):
+    """The motor's size and drive; `part` names its catalogue entry, or None.
 
     `absent`: a custom design without a motor. Nothing is drawn for it; the sizes are placeholders.
     """
 
-    part: str | None
-    diameter_mm: float
-    thickness_mm: float
-    drive: Drive
-    fill: bool
-    lip_mm: float
-    absent: bool = False
+    absent: bool | UnsetType = UNSET
 
 
-class Circuit(Table, frozen=True, kw_only=True):
-    """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
-
-    tail: Literal["one", "both"]
-    thickness_mm: float
-    tail_width_mm: float
-    tail_length_mm: float
-    pad_diameter_mm: float
-    tail_end_width_mm: float
-
-
-class CastLayer(Table, frozen=True, kw_only=True):
+class CastLayer(LayerTable, frozen=True, kw_only=True):
     """One silicone layer: its wall, and its cap if the design has caps (0: an open ring)."""
 
-    material: str
-    wall_mm: float
-    cap_mm: float
-
-
-class Moulds(Table, frozen=True, kw_only=True):
-    """The tooling's lengths, with the printer's written out unless the spec overrides them."""
-
-    printer: str
-    cavities: tuple[int, int] | Literal["fill"]
-    bed_x_mm: float
-    bed_y_mm: float
-    bed_z_mm: float
-    layer_mm: float
-    xy_play_mm: float
-    plinth_clearance_mm: float
-    rib_interference_mm: float
-    bore_compensation_mm: float
-    seat_relief_mm: float
-    slot_height_mm: float
-    slot_width_clearance_mm: float
-    window_clearance_mm: float
-    least_wall_mm: float
-    skirt_wall_mm: float
-    land_mm: float
-    groove_width_mm: float
-    groove_depth_mm: float
-    filament_hole_mm: float
-    engraving_depth_mm: float
-    engraving_stroke_mm: float
-    pour: Literal["open", "injected"]
-    sprue_mm: float
-    vents: int | None
-    filament_mm: float
-    plinth_height_mm: float
-    plate_mm: float
-    ledge_mm: float
-    shrinkage_percent: float
-    draft_deg: float = 0.0
-
-
-class Estimate(Table, frozen=True, kw_only=True):
-    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body, the models, which moduli.
-
-    `fit` names a lab's fit, `fit_source` is the text of that file.
-    """
-
-    frequency_hz: float
-    amplitude_um: float
-    tissue: str
-    models: tuple[Model, ...]
-    moduli: Moduli = "small-strain"
-    fit: str | None = None
-    fit_source: str | None = None
-
-
-class Output(Table, frozen=True, kw_only=True):
-    """Formats, and the largest distance of a mesh from the true surface in mm."""
-
-    formats: tuple[Format, ...]
-    tolerance_mm: float
+    cap_mm: float = 0.0
 
 
 if TYPE_CHECKING:
@@ -154,7 +72,7 @@ else:
             return inspect.signature(RawSpec)
 
 
-class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
+class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
     """A haptic unit with every value resolved.
 
     Parameters
@@ -197,24 +115,8 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
     Spec('control': embedded, 14 mm, ecoflex-00-30 2.5)
     """
 
-    name: str
-    design: str
-    diameter_mm: float
-    skin_mm: float
-    motor: MotorSize
-    fpcb: Circuit | None
-    wires: Wires | None
+    motor: MotorSize = DERIVED
     layers: tuple[CastLayer, ...]
-    moulds: Moulds
-    casting: Casting
-    estimate: Estimate
-    output: Output
-    materials: dict[str, MaterialEntry]
-    motors: dict[str, MotorEntry]
-    printers: dict[str, PrinterEntry]
-    tissue: dict[str, dict[str, TissueEntry]]
-    parameters: dict[str, bool | int | float | str]
-    design_source: str | None
 
     if TYPE_CHECKING:
 
@@ -224,15 +126,15 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
             name: str,
             design: str,
             diameter_mm: float,
-            layers: Sequence[LayerTable | CastLayer | _Keys],
+            layers: Sequence[LayerTable | _Keys],
             skin_mm: float = 0.0,
-            motor: MotorTable | MotorSize | _Keys | bool = ...,
-            fpcb: FpcbTable | Circuit | _Keys | None = None,
+            motor: MotorTable | _Keys | bool = ...,
+            fpcb: FpcbTable | _Keys | None = None,
             wires: WiresTable | _Keys | None = None,
-            moulds: MouldsTable | Moulds | _Keys = ...,
+            moulds: MouldsTable | _Keys = ...,
             casting: CastingTable | _Keys = ...,
-            estimate: EstimateTable | Estimate | _Keys = ...,
-            output: OutputTable | Output | _Keys = ...,
+            estimate: EstimateTable | _Keys = ...,
+            output: OutputTable | _Keys = ...,
             materials: Mapping[str, MaterialEntry | _Keys] = ...,
             motors: Mapping[str, MotorEntry | _Keys] = ...,
             printers: Mapping[str, PrinterEntry | _Keys] = ...,
@@ -287,7 +189,7 @@ def printer_of(spec: Spec) -> catalogue.Printer:
 
 
 @lru_cache(maxsize=16)
-def _override(printer: catalogue.Printer, moulds: Moulds) -> catalogue.Printer:
+def _override(printer: catalogue.Printer, moulds: MouldsTable) -> catalogue.Printer:
     overridden = {
         name: catalogue.Value(value, "spec", "moulds")
         for name, value in structs.asdict(moulds).items()

@@ -17,6 +17,7 @@ from msgspec import structs
 
 from unitcad.errors import UnitcadError
 from unitcad.files import read_text
+from unitcad.spec.convert import without_none
 from unitcad.spec.resolved import Spec, with_formats
 
 _STRING = r'"""(?:\\.|[^\\])*?"{3,5}|' + r"'''.*?'{3,5}|" + r'"(?:\\.|[^"\\\n]++)*+"|' + r"'[^'\n]*+'"
@@ -169,37 +170,9 @@ def spec_hash(spec: Spec) -> str:
 
 def to_toml(spec: Spec) -> str:
     """Return the spec as TOML: the same spec when read again."""
-    literals, tables = [], []
-    for key, value in to_data(spec).items():
-        text = _key_text(key, value)
-        (tables if text.startswith("[") else literals).append(text)
-    return "\n".join(["".join(literals), *tables])
-
-
-_TEXTS: dict[tuple[str, str], str] = {}
-"""Keys of specs as TOML, by their values: a variant differs from the one before in few of them."""
-_MOST_TEXTS, _LONGEST = 256, 2000
-
-
-def _key_text(key: str, value: Any) -> str:
-    """Return one key of a spec as TOML, as in the whole file."""
-    named = key, repr(value)
-    if named in _TEXTS:
-        return _TEXTS[named]
-    text = tomli_w.dumps({key: value})
-    if len(named[1]) <= _LONGEST:
-        if len(_TEXTS) >= _MOST_TEXTS:
-            _TEXTS.clear()
-        _TEXTS[named] = text
-    return text
+    return text_of(to_data(spec))
 
 
 def text_of(data: Mapping[str, Any]) -> str:
     """Return a spec's plain data as TOML."""
     return tomli_w.dumps(data)
-
-
-def without_none(node: Any) -> Any:
-    if isinstance(node, dict):
-        return {key: without_none(value) for key, value in node.items() if value is not None}
-    return [without_none(value) for value in node] if isinstance(node, list | tuple) else node

@@ -27,6 +27,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from msgspec import Meta, Struct, field, structs
 
 from unitcad.cache import digest
+from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import subject_of_data
@@ -145,9 +146,9 @@ MOST = 1_000_000
 class Range(Struct, frozen=True, forbid_unknown_fields=True):
     """`num` values from `start` to `stop`, both included."""
 
-    start: Annotated[float, Meta(ge=-1e12, le=1e12)]
-    stop: Annotated[float, Meta(ge=-1e12, le=1e12)]
-    num: Annotated[int, Meta(ge=1, le=1_000_000_000)]
+    start: Annotated[float, between(-1e12, 1e12)]
+    stop: Annotated[float, between(-1e12, 1e12)]
+    num: Annotated[int, between(1, 1_000_000_000)]
 
     def __len__(self) -> int:
         return self.num

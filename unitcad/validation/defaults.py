@@ -16,10 +16,10 @@ from unitcad.designs import Design, design_of
 from unitcad.designs.limits import EPS, check_ribs, farthest_push, leaf_mm, least_skirt, least_slot
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.rooms import kind_of
-from unitcad.spec import Spec, convert, motor_of
+from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
-from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, Format, RawSpec
-from unitcad.spec.resolved import CastLayer, Circuit, Estimate, MotorSize, Moulds, Output
+from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, Format, FpcbTable, MouldsTable, RawSpec
+from unitcad.spec.resolved import CastLayer, MotorSize
 from unitcad.text import number, with_article
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ UNKNOWN_DRIVE: Drive = "flat"
 """A coin ERM's, as the paper's motor is."""
 _BASE = {"plinth_height_mm": 2.0, "plate_mm": 4.0}
 """The base's heights, before they end whole layers, mm; a plinth is higher where the leaves of resin cups need it."""
-_PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
+_PRINTER_LENGTHS = tuple(f for f in MouldsTable.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
 
 
 def resolve(raw: RawSpec) -> Spec:
@@ -110,27 +110,18 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
     for name in (raw.estimate.tissue, *raw.tissue):
         catalogue.tissue(name, raw.tissue)
     return Spec.settled(
-        name=raw.name,
-        design=raw.design,
-        diameter_mm=raw.diameter_mm,
-        skin_mm=raw.skin_mm,
-        motor=motor,
-        fpcb=fpcb,
-        wires=raw.wires,
-        layers=tuple(
-            CastLayer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0)
-            for layer in raw.layers
-        ),
-        moulds=moulds,
-        casting=raw.casting,
-        estimate=estimate,
-        output=Output(formats=_formats(raw), tolerance_mm=raw.output.tolerance_mm),
-        materials=raw.materials,
-        motors=raw.motors,
-        printers=raw.printers,
-        tissue=raw.tissue,
-        parameters=raw.parameters,
-        design_source=raw.design_source,
+        **{
+            **structs.asdict(raw),
+            "motor": motor,
+            "fpcb": fpcb,
+            "layers": tuple(
+                CastLayer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0)
+                for layer in raw.layers
+            ),
+            "moulds": moulds,
+            "estimate": estimate,
+            "output": structs.replace(raw.output, formats=_formats(raw)),
+        }
     )
 
 
@@ -139,7 +130,7 @@ def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     if isinstance(raw.motor, bool):
         return None, _no_motor(raw)
     given, part = raw.motor, None
-    sizes = {"diameter_mm": given.diameter_mm, "thickness_mm": given.thickness_mm}
+    sizes: dict[str, Any] = {size: getattr(given, size) for size in MOTOR_SIZES}
     name = DEFAULT_MOTOR if given.part is None and set(sizes.values()) == {None} else given.part
     if name is not None:
         part = catalogue.choose("motor.part", name, catalogue.motors(raw.motors))
@@ -147,9 +138,8 @@ def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     for field, size in sizes.items():
         if size is None:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
-    known: dict[str, Any] = {field: size for field, size in sizes.items() if size is not None}
     drive = given.drive or (part.drive.value if part and part.drive else UNKNOWN_DRIVE)
-    return part, MotorSize(part=name, drive=drive, fill=given.fill, lip_mm=given.lip_mm, **known)
+    return part, MotorSize(**{**structs.asdict(given), **sizes, "part": name, "drive": drive})
 
 
 def _no_motor(raw: RawSpec) -> MotorSize:
@@ -161,20 +151,11 @@ def _no_motor(raw: RawSpec) -> MotorSize:
     for field in ("fpcb", "wires"):
         if getattr(raw, field):
             raise Refusal(field, None, "leads to a motor, and motor = false: leave one of them out")
-    entry = catalogue.motors()[DEFAULT_MOTOR]
-    diameter, thickness = float(entry.diameter_mm), float(entry.thickness_mm)
-    return MotorSize(
-        part=None,
-        diameter_mm=diameter,
-        thickness_mm=thickness,
-        drive=UNKNOWN_DRIVE,
-        fill=False,
-        lip_mm=0.0,
-        absent=True,
-    )
+    sizes: dict[str, Any] = {size: float(getattr(catalogue.motors()[DEFAULT_MOTOR], size)) for size in MOTOR_SIZES}
+    return MotorSize(drive=UNKNOWN_DRIVE, absent=True, **sizes)
 
 
-def _moulds(raw: RawSpec, design: Design) -> Moulds:
+def _moulds(raw: RawSpec, design: Design) -> MouldsTable:
     """Return the tooling's lengths: the printer's where the spec gives none, the slot as high as what it takes.
 
     Heights that the spec does not give end whole layers of the printer.
@@ -194,7 +175,7 @@ def _moulds(raw: RawSpec, design: Design) -> Moulds:
         lengths["shrinkage_percent"] = max(float(known[one.material].shrinkage_percent or 0.0) for one in raw.layers)
     for name in {"slot_height_mm", *_BASE} & lengths.keys():
         lengths[name] = round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
-    return Moulds(**{**given, **lengths})
+    return convert({**given, **lengths}, MouldsTable, "moulds")
 
 
 def _for_leaves(printer: catalogue.Printer, lengths: dict[str, Any]) -> float:
@@ -206,7 +187,7 @@ def _for_leaves(printer: catalogue.Printer, lengths: dict[str, Any]) -> float:
     return least_skirt(leaf, pushed) + lengths["seat_relief_mm"]
 
 
-def _circuit(raw: RawSpec, design: Design, motor: MotorSize) -> Circuit | None:
+def _circuit(raw: RawSpec, design: Design, motor: MotorSize) -> FpcbTable | None:
     """Return the circuit with its pad, which the design sizes, and its tail's end, as wide as the tail."""
     fpcb = raw.fpcb
     if fpcb is None:
@@ -218,7 +199,7 @@ def _circuit(raw: RawSpec, design: Design, motor: MotorSize) -> Circuit | None:
         # Where no pad fits, the limits refuse the diameter; until then it is as large as the motor.
         pad = round(2 * radius, 9) if radius > 0 else motor.diameter_mm
     end = fpcb.tail_width_mm if fpcb.tail_end_width_mm is None else fpcb.tail_end_width_mm
-    return Circuit(**{**structs.asdict(fpcb), "pad_diameter_mm": pad, "tail_end_width_mm": end})
+    return structs.replace(fpcb, pad_diameter_mm=pad, tail_end_width_mm=end)
 
 
 def _formats(raw: RawSpec) -> tuple[Format, ...]:
@@ -228,7 +209,7 @@ def _formats(raw: RawSpec) -> tuple[Format, ...]:
     return ("step", "stl", "3mf") if find_spec("OCP") else ("stl", "3mf")
 
 
-def _estimate(raw: RawSpec, part: catalogue.Motor | None) -> Estimate:
+def _estimate(raw: RawSpec, part: catalogue.Motor | None) -> EstimateTable:
     """Return what the estimate reads: the motor's frequency and amplitude where the spec gives none."""
     unknown = dict(UNKNOWN_MOTOR)
     if part and part.rpm:
@@ -240,14 +221,7 @@ def _estimate(raw: RawSpec, part: catalogue.Motor | None) -> Estimate:
     chosen = raw.estimate
     if chosen.fit is not None or chosen.fit_source is not None:
         check_fit(chosen)
-    return Estimate(
-        tissue=chosen.tissue,
-        models=chosen.models,
-        moduli=chosen.moduli,
-        fit=chosen.fit,
-        fit_source=chosen.fit_source,
-        **values,
-    )
+    return structs.replace(chosen, **values)
 
 
 CIRCUIT_STOCK = (0.05, 0.5)

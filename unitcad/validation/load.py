@@ -229,7 +229,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
 
 
 def apply_changes(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
-    """Return `data` with changes by `changes_of` put in."""
+    """Return `data` with changes by `changes_of` put in. None: the key is left out."""
     result = dict(data)
     for change in changes:
         if isinstance(change, str):

@@ -10,11 +10,11 @@ from typing import Any, Protocol, cast
 
 from msgspec import Struct
 
-from unitcad.catalogue import Printer
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, to_data
-from unitcad.spec.fields import index_in
-from unitcad.spec.resolved import CastLayer, MotorSize, Moulds
+from unitcad.spec.fields import fields_of, index_in, table_in, takes_none
+from unitcad.spec.raw import DERIVED, RawSpec
+from unitcad.spec.resolved import CastLayer, MotorSize
 
 MOST_PARTS = 200
 """Parts of a path at most; a name may have dots of its own."""
@@ -107,14 +107,12 @@ Source = str | os.PathLike[str] | Mapping[str, object] | Spec | HasSpec
 Changes = Mapping[str, object] | Iterable[str] | str
 """Values by their dotted path ("layers.0.wall_mm"), or texts "path=value" with a value in TOML syntax."""
 
-_LENGTHS = tuple(set(Moulds.__struct_fields__) & set(Printer.__struct_fields__))
 _DERIVED = {
-    "motor": ("diameter_mm", "thickness_mm", "drive"),
-    "fpcb": ("pad_diameter_mm", "tail_end_width_mm"),
-    "moulds": (*_LENGTHS, "plinth_height_mm", "plate_mm", "shrinkage_percent"),
-    "estimate": ("frequency_hz", "amplitude_um"),
+    name: [key for key, below in fields_of(table).items() if below.default is DERIVED and not takes_none(below.type)]
+    for name, field in fields_of(RawSpec).items()
+    if (table := table_in(field.type))
 }
-"""What validation works out from other values where a spec leaves it out."""
+"""The keys of each table whose values validation works out if a spec leaves them out."""
 
 
 def plain(node: object, field: str = "") -> Any:

@@ -47,9 +47,10 @@ from unitcad.attenuation.edge.models import (
     stored,
 )
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.catalogue.entries import between
 from unitcad.text import some
 
-Positive = Annotated[float, Meta(ge=1e-9, le=1e9)]
+Positive = Annotated[float, between(1e-9, 1e9)]
 PERCENT = (10, 90)
 """Ends of a predictive range."""
 
@@ -67,9 +68,9 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     low: dict[str, Positive]
     high: dict[str, Positive]
     stored: dict[str, Positive]
-    degrees_of_freedom: Annotated[int, Meta(ge=1, le=100000)]
-    model_error: Annotated[float, Meta(ge=1e-6, le=10)]
-    covariance: list[list[Annotated[float, Meta(ge=-1e9, le=1e9)]]]
+    degrees_of_freedom: Annotated[int, between(1, 100000)]
+    model_error: Annotated[float, between(1e-6, 10)]
+    covariance: list[list[Annotated[float, between(-1e9, 1e9)]]]
     leave_one_out: Positive
     leave_one_out_low: Positive
     leave_one_out_high: Positive
@@ -112,12 +113,12 @@ class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
     """
 
-    format: Annotated[int, Meta(ge=1, le=1)]
+    format: Annotated[int, between(1, 1)]
     name: Annotated[str, Meta(min_length=1, max_length=100)]
-    units: Annotated[int, Meta(ge=1, le=100000)]
+    units: Annotated[int, between(1, 100000)]
     moduli: Literal["small-strain", "quasi-static"]
     include_paper_units: bool
-    between_labs: Annotated[float, Meta(ge=0, le=100)]
+    between_labs: Annotated[float, between(0, 100)]
     seed: int
     leads: Literal["rule", "published", "corrected", "divider"]
     model: dict[str, ModelFit]

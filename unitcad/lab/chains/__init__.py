@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
+from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal, unknown_name
 from unitcad.geometry.arrays import Floats
 from unitcad.rooms import load
@@ -63,7 +64,7 @@ class LineFit:
     phase: Phase = field(compare=False, repr=False)
 
 
-Hertz = Annotated[float, Meta(ge=1, le=500)]
+Hertz = Annotated[float, between(1, 500)]
 ChainName = Annotated[str, Meta(min_length=1, max_length=40)]
 
 
@@ -78,18 +79,16 @@ class ChainTable(Table, frozen=True, kw_only=True):
             description="signal chains, line or bandpass; the first one's levels are the result",
         ),
     ] = ("line",)
-    mains_hz: Annotated[float, Meta(ge=40, le=400, description="frequency of the mains")] = 50.0
+    mains_hz: Annotated[float, between(40, 400, "frequency of the mains")] = 50.0
     band_hz: Annotated[tuple[Hertz, Hertz], Meta(description="band in which the motor's line is searched")] = (
         60.0,
         250.0,
     )
-    order: Annotated[int, Meta(ge=1, le=10, description="order of the band-pass (chain bandpass)")] = 4
-    q: Annotated[float, Meta(ge=1, le=1000, description="quality of the comb filter (chain bandpass)")] = 30.0
+    order: Annotated[int, between(1, 10, "order of the band-pass (chain bandpass)")] = 4
+    q: Annotated[float, between(1, 1000, "quality of the comb filter (chain bandpass)")] = 30.0
     zero_phase: Annotated[bool, Meta(description="whether filters run forwards and backwards (chain bandpass)")] = True
     measure: Annotated[Literal["rms", "peak"], Meta(description="amplitude as rms or peak (chain bandpass)")] = "rms"
-    trim_s: Annotated[
-        float, Meta(ge=0, le=1000, description="seconds cut from both ends after filtering (chain bandpass)")
-    ] = 0.25
+    trim_s: Annotated[float, between(0, 1000, "seconds cut from both ends after filtering (chain bandpass)")] = 0.25
 
 
 @dataclass(frozen=True)

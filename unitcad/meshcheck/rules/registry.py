@@ -96,8 +96,6 @@ def check_prefixes(option: str, prefixes: Sequence[str] | None) -> tuple[str, ..
         wanted = prefix.strip().upper()
         if not wanted or not any(code.startswith(wanted) for code in rules()):
             near = get_close_matches(wanted, rules(), n=1, cutoff=0.5)
-            raise Refusal(
-                option, prefix, "unknown code; unitcad check --list-rules lists all", near[0] if near else None
-            )
+            raise Refusal(option, prefix, "unknown code; unitcad list rules lists all", near[0] if near else None)
         kept.append(wanted)
     return tuple(kept)
