@@ -25,7 +25,6 @@ from unitcad.cache import shared_store
 from unitcad.sweeps import BatchOptions, load_sweep
 from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.run import run
-from unitcad.sweeps.task import outcomes
 
 
 class Counted:
@@ -59,7 +58,7 @@ class Timed(SerialExecutor):
         start = time.process_time()
         future = super().submit(fn, *args, **kwargs)
         seconds = time.process_time() - start
-        done = outcomes(future.result())
+        done = future.result()
         self.tasks += 1
         if any(outcome.built for outcome in done):
             self.making, self.made = self.making + seconds, self.made + 1

@@ -16,7 +16,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import ADDRESS, whole
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.journal import JournalEntry
-from unitcad.sweeps.record_packs import export, intact, pack_specs
+from unitcad.sweeps.record_packs import export, intact
 from unitcad.sweeps.task import Task, VariantOutcome
 
 
@@ -102,10 +102,8 @@ class InStore:
         return entry.manifest if entry.record else ""
 
     def task(self, task: Task) -> Task:
-        specs = pack_specs(self.store, [job.spec for job in task.jobs])
-        jobs = tuple(replace(job, spec="") for job in task.jobs)
         cache = self.cache.root.absolute() if self.cache else None
-        return replace(task, jobs=jobs, specs=specs, store=self.store.address, cache=cache)
+        return replace(task, store=self.store.address, cache=cache)
 
     def take(self, outcome: VariantOutcome) -> VariantOutcome:
         place = outcome.record

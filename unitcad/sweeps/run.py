@@ -156,7 +156,7 @@ class _Batch:
         self.tried: set[int] = set()
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
-        self.running: dict[Future[tasks.Answer], Task] = {}
+        self.running: dict[Future[list[VariantOutcome]], Task] = {}
         self.lost = False  # whether a worker ended in the middle of its task
 
     def all(self) -> None:
@@ -247,7 +247,7 @@ class _Batch:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
             try:
-                outcomes = tasks.outcomes(future.result())
+                outcomes = future.result()
             except WorkerEnded as error:
                 self._lost(task, error)
             except UnitcadError:  # with NoWorker: if no worker can start, none of the others can be made either

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import pickle
 import time
-import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -47,8 +45,8 @@ class Job:
 class Task:
     """Variants of one geometry, and how to make them.
 
-    With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.pack_specs`; work is
-    then shared by `cache` if there is one, else by the store. Without, they go to folders in `out`, with a `cache`.
+    With `store` (an address) results go there; work is then shared by `cache` if there is one, else by the store.
+    Without, they go to folders in `out`, with a `cache`.
     `allowed` is the code that the caller may run, and so may the worker.
     """
 
@@ -60,7 +58,6 @@ class Task:
     out: Path = Path()
     cache: Path | None = None
     store: str | None = None
-    specs: bytes | str = b""
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
@@ -86,22 +83,14 @@ class VariantOutcome:
     bundle: Bundle | None = None
 
 
-Answer = list[VariantOutcome] | bytes
-
-
-def work(task: Task) -> Answer:
-    """Make a task's variants; return the argument of `outcomes`. An error of one of them is in its outcome."""
+def work(task: Task) -> list[VariantOutcome]:
+    """Make a task's variants. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
     if task.store:
-        return zlib.compress(pickle.dumps(_into_store(task, record_packs.store_at(task.store))))
+        return _into_store(task, record_packs.store_at(task.store))
     return _into_folders(task)
-
-
-def outcomes(answer: Answer) -> list[VariantOutcome]:
-    """Return the outcomes in a task's answer. It is a pickle of a worker's, as all that the executor brings."""
-    return pickle.loads(zlib.decompress(answer)) if isinstance(answer, bytes) else answer
 
 
 def _each(
@@ -125,12 +114,10 @@ def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
     """Make a task's variants, put new contents into the store, and return rows: when they return, all is there."""
     anew = any(job.damaged for job in task.jobs)
     try:
-        specs = record_packs.unpack_specs(store, task.specs)
         known = None if anew or task.cache else record_packs.known_bundle(store, task.geometry)
     except Exception as error:
         return [failure(job.index, error) for job in task.jobs]
-    jobs = [replace(job, spec=spec) for job, spec in zip(task.jobs, specs, strict=True)]
-    done = _each(jobs, task, lambda job, known: _deliver(job, task, known, store, anew), known)
+    done = _each(task.jobs, task, lambda job, known: _deliver(job, task, known, store, anew), known)
     try:
         places = record_packs.pack(store, [outcome.product for outcome in done if outcome.product])
     except Exception as error:
