@@ -20,20 +20,6 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import from_data
 
 
-def test_nearest_values_lead_to_a_build_or_another_limit():
-    for seed in range(20):
-        data = seeded_spec(seed, "extreme")
-        for _ in range(41):
-            refusal = refusal_of(data)
-            if refusal is None or refusal.nearest is None:
-                break
-            data = put_in(data, refusal.field, refusal.nearest)
-            after = refusal_of(data)
-            assert after is None or (after.field, after.limit) != (refusal.field, refusal.limit), (seed, str(after))
-        else:
-            pytest.fail(f"seed {seed}: the nearest values never end")
-
-
 def test_the_docs_have_the_documented_ranges():
     page = (Path(__file__).parents[2] / "docs" / "reference" / "spec.md").read_text("utf-8")
     for name, low, high in DOCUMENTED.rows():
