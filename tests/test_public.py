@@ -23,7 +23,6 @@ from unitcad.catalogue import entries
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.raw import RawSpec
 
-PACKAGE = Path(unitcad.__file__).parent
 LAYERS = [
     {"material": "ecoflex-00-10", "wall_mm": 1.25, "cap_mm": 1.0},
     {"material": "dragon-skin-30", "wall_mm": 1.25, "cap_mm": 1.0},

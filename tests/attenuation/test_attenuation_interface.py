@@ -3,17 +3,13 @@
 import doctest
 import math
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import unitcad
 from unitcad import attenuation
 from unitcad.attenuation import layered
 from unitcad.errors import Refusal, UnitcadError
-
-PACKAGE = Path(unitcad.__file__).parent
 
 
 def test_the_example_of_the_docstring_runs():
