@@ -19,7 +19,7 @@ from unitcad.casting.bill import Item, to_csv
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
 from unitcad.catalogue import printers
 from unitcad.cli.output import print_indented, print_json, print_table, progress, warn
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.shared_options import AsJson, Out
 from unitcad.export import printing, svg
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready
@@ -486,9 +486,7 @@ def phantom(
     source: Annotated[
         str, typer.Argument(metavar="[PHANTOM]", help="Phantom file, or name of a shipped one (unitcad list phantoms).")
     ] = "skin",
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the phantom's folder.")] = Path(
-        "out"
-    ),
+    out: Out = Path("out"),
     png: Annotated[bool, typer.Option("--png", help="Also draw the box taken apart, box.png.")] = False,
     as_json: AsJson = False,
 ) -> None:
