@@ -1,6 +1,6 @@
-"""What a variant costs with a store: processor time of parent and worker, requests, bytes, memory, and the merge.
+"""The cost of a variant with a store: processor time of parent and worker, requests, bytes, memory.
 
-    python benchmarks/bench_store.py [--variants 1000] [--geometries 5] [--shards 4] [--only unit,moulds] [--json FILE]
+    python benchmarks/bench_store.py [--variants 1000] [--geometries 5] [--only unit,moulds] [--json FILE]
 
 All in one process, one task after the other, on a store in a folder whose requests are counted. Processor time, so that
 other work on the machine does not count. docs/explanation/scaling.md computes large batches from these figures.
@@ -23,11 +23,8 @@ from bench_nodes import sweep_text
 
 from unitcad.cache import shared_store
 from unitcad.sweeps import BatchOptions, load_sweep
-from unitcad.sweeps.batch_command import merge
 from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.run import run
-from unitcad.sweeps.shards import Shard, shard_folders
-from unitcad.sweeps.task import outcomes
 
 
 class Counted:
@@ -61,7 +58,7 @@ class Timed(SerialExecutor):
         start = time.process_time()
         future = super().submit(fn, *args, **kwargs)
         seconds = time.process_time() - start
-        done = outcomes(future.result())
+        done = future.result()
         self.tasks += 1
         if any(outcome.built for outcome in done):
             self.making, self.made = self.making + seconds, self.made + 1
@@ -75,7 +72,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--variants", type=int, default=1000)
     parser.add_argument("--geometries", type=int, default=5)
-    parser.add_argument("--shards", type=int, default=4)
     parser.add_argument("--only", default="unit,moulds")
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
@@ -93,15 +89,10 @@ def measured(asked: argparse.Namespace, scratch: Path) -> dict[str, Any]:
     shared_store.objects_at = lambda address: Counted(plain(address), counts)
     only = tuple(asked.only.split(","))
     start, process = time.process_time(), psutil.Process()
-    for number in range(1, asked.shards + 1):
-        shard = Shard(number, asked.shards)
-        options = BatchOptions(only, store=str(scratch / "store"), folders=False, shard=shard, cache=scratch / "cache")
-        summary = run(sweep, scratch / "out" / shard.folder, options, executor, workers=1)
-        assert summary.ok == summary.variants, summary.failures
+    options = BatchOptions(only, store=str(scratch / "store"), folders=False, cache=scratch / "cache")
+    summary = run(sweep, scratch / "out", options, executor, workers=1)
+    assert summary.ok == summary.variants, summary.failures
     parent = time.process_time() - start - executor.making - executor.reusing
-    start = time.process_time()
-    merge(scratch / "out", shard_folders(scratch / "out"), BatchOptions(folders=False, cache=scratch / "cache"))
-    merging = time.process_time() - start
     journal = (scratch / "out" / "journal.jsonl").stat().st_size
     tables = {path.name: path.stat().st_size for path in (scratch / "out").glob("*.*") if path.name != "journal.jsonl"}
     each = executor.reusing / max(1, executor.reused)
@@ -112,7 +103,6 @@ def measured(asked: argparse.Namespace, scratch: Path) -> dict[str, Any]:
         "parent_ms_a_variant": round(1000 * parent / asked.variants, 3),
         "worker_ms_a_variant": round(1000 * each, 3),
         "worker_ms_a_geometry": round(1000 * (executor.making - executor.beside * each) / max(1, executor.made)),
-        "merge_ms_a_variant": round(1000 * merging / asked.variants, 3),
         "memory_mb": round(process.memory_info().rss / 1e6, 1),
         "requests": {verb: count for verb, count in sorted(counts.items()) if not verb.startswith("bytes")},
         "bytes": {kind[6:]: count for kind, count in sorted(counts.items()) if kind.startswith("bytes")},

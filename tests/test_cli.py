@@ -29,35 +29,6 @@ def test_list_names_what_is_shipped(kind):
             assert all(value["status"] and value["source"] for value in entry.values())
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["list", "motor"],
-        ["build", "encapsulatin"],
-        ["build", "./none.toml"],
-        ["build", "encapsulating", "--formats", "stp"],
-        ["build", "encapsulating", "--only", "mould"],
-        ["build", "encapsulating", "--only", ""],
-        ["build", "encapsulating", "--set", "diameter_mm"],
-        ["build"],
-        ["nothing"],
-    ],
-)
-def test_asked_wrongly_is_exit_2_and_writes_nothing(words, tmp_path):
-    done = run(*words, cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_an_output_that_is_a_file_is_refused(tmp_path):
-    (tmp_path / "out").write_text("mine")
-    done = run("build", "embedded", "--formats", "stl", cwd=tmp_path)
-    assert done.returncode == 2
-    assert (tmp_path / "out").read_text() == "mine"
-
-
 def test_a_folder_that_can_not_be_written_is_one_line(tmp_path):
     if os.geteuid() == 0:
         target = "/proc/none"
@@ -70,13 +41,13 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize(("setting", "field"), [("layers.0.cap_mm=500", "layers.0.cap_mm"), ("diameter_mm=900",) * 2])
-def test_estimate_says_that_build_would_refuse_the_moulds(setting, field, tmp_path):
+def test_estimate_says_that_build_would_refuse_the_moulds(tmp_path):
+    setting = "layers.0.cap_mm=500"
     estimated = run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
     built = run("build", "encapsulating", "--set", setting, cwd=tmp_path)
     assert (estimated.returncode, built.returncode) == (0, 2)
     reason = built.stderr.removeprefix("error: ")
-    assert reason.startswith(field.partition("=")[0] + " = ")
+    assert reason.startswith("layers.0.cap_mm = ")
     assert estimated.stderr == f"warning: encapsulating: its moulds can't be made: {reason}"
     assert json.loads(estimated.stdout)["models"]["divider"]
 

@@ -78,15 +78,6 @@ def test_the_circuit_touches_what_the_design_says(name):
     )
 
 
-def test_heights_are_those_of_the_design():
-    heights = {n: Variant.of(n).dimensions for n in ("embedded", "encapsulating")}
-    assert heights["embedded"].heights == (2.0, 2.0)
-    assert heights["embedded"].cavity_radius == 4.5
-    assert (heights["encapsulating"].core_height, *heights["encapsulating"].heights) == pytest.approx(
-        (2.11, 3.36, 4.61)
-    )
-
-
 def test_fill_closes_the_ring_of_air():
     loose, filled = Variant.of("embedded"), Variant.of("embedded", "motor.fill=true")
     assert loose.dimensions.air_ring == pytest.approx(1.0)

@@ -9,7 +9,6 @@ import pytest
 from PIL import Image
 
 from unitcad.export import raster
-from unitcad.export.finding_pictures import common_line
 from unitcad.export.raster import Surface
 from unitcad.pipeline.scenes import exploded_view, unit_cut_open
 from unitcad.pipeline.variant import Variant
@@ -85,16 +84,6 @@ def test_lines_run_round_smooth_patches_and_wires_along_all_sides():
     assert set(np.flatnonzero(dark[100])) == {49, 50, 149, 150}  # not along the diagonal, which is at 99
     assert set(np.flatnonzero(wired[100] < 0.5 * lit)) - set(np.flatnonzero(dark[100])) <= {99, 100}
     assert wired[100, 99:101].min() == int(lit * raster.WIRE)
-
-
-def test_the_line_of_two_triangles():
-    flat = np.array([[-4, -4, 0], [4, -4, 0], [0, 4, 0]], float)
-    upright = np.array([[-1, 0, -1], [1, 0, -1], [0, 0, 3]], float)
-    line = common_line(flat, upright)
-    assert line is not None
-    assert sorted(line.tolist()) == [pytest.approx([-0.75, 0, 0]), pytest.approx([0.75, 0, 0])]
-    assert common_line(flat, flat) is None
-    assert common_line(flat, upright + np.array([0, 0, 5])) is None
 
 
 def faults(owner, boxes, ends):

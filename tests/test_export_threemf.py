@@ -4,8 +4,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from sample_bodies import all_bodies
 
 from unitcad.export import printing
@@ -60,16 +58,6 @@ def test_read_back_equals_written(parts):
         base = bases[int(node.get("pindex", ""))]
         shown = tuple(int(base.get("displaycolor", "")[i : i + 2], 16) for i in (1, 3, 5))
         assert shown == tuple(round(255 * channel) for channel in part.colour)
-
-
-@given(st.lists(st.tuples(st.floats(0.1, 150), st.floats(0.1, 150)), min_size=1, max_size=12))
-def test_layout_never_overlaps(footprints):
-    corners = printing.layout(footprints, (220, 220))
-    for i, ((x, y), (w, d)) in enumerate(zip(corners, footprints, strict=True)):
-        assert x >= 0
-        assert x + w <= 220 + 1e-9
-        for (ox, oy), (ow, od) in zip(corners[:i], footprints[:i], strict=True):
-            assert max(x - ox - ow, ox - x - w, y - oy - od, oy - y - d) >= printing.GAP_MM - 1e-9
 
 
 def test_names_are_escaped(parts):

@@ -1,11 +1,8 @@
 """Every fault of a spec at once, each with its line; a value that is offered is accepted."""
 
-import copy
 import json
-import random
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -13,8 +10,7 @@ from typer.testing import CliRunner
 
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.validation import load, put, read, templates
-from unitcad.validation.plain_data import ABSENT, at
+from unitcad.validation import load, read, templates
 
 BAD = """\
 name = "bad"
@@ -85,23 +81,6 @@ def test_the_command_prints_a_line_a_fault_in_the_order_of_the_file(bad):
     assert [path.name for path in bad.parent.iterdir()] == ["bad.toml"]
 
 
-def test_names_are_refused_with_those_that_there_are(bad):
-    told = {one.field: str(one) for one in (refusal(bad), *refusal(bad).others)}
-    assert "closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'" in told["moulds.printer"]
-    for name in ("corrected", "divider", "fem", "published", "rule"):
-        assert name in told["estimate.models.0"]
-    assert "nearest" not in told["estimate.models.0"]
-
-
-def test_what_is_offered_beside_other_faults_is_accepted_once_they_are_gone(bad):
-    nearest = {one.field: one.nearest for one in (refusal(bad), *refusal(bad).others)}["diameter_mm"]
-    data = tomllib.loads(BAD)
-    del data["colour"], data["moulds"], data["estimate"]
-    data["layers"][1] |= {"material": "dragon-skin-30", "wall_mm": 1.25}
-    load(data | {"diameter_mm": nearest})
-    assert refusal(data | {"diameter_mm": nearest - 0.01}).field == "diameter_mm"  # type: ignore[operator]
-
-
 def test_a_fault_that_only_follows_from_another_is_not_listed(tmp_path):
     """A diameter of 12.2 mm, the least that is accepted, has no room for this tail; one of 14 mm has."""
     data = read("encapsulating")
@@ -126,35 +105,6 @@ def test_a_key_that_is_missing_is_on_the_line_of_its_table(tmp_path):
     lines = {one.field: one.line for one in found}
     assert lines["layers.1.material"] == 10
     assert lines["diameter_mm"] is None
-
-
-@pytest.mark.parametrize("name", templates())
-def test_several_planted_faults_are_all_found(name, tmp_path):
-    """Three values out of range, drawn at random: each is listed, and nothing else."""
-    planted = {
-        "layers.0.wall_mm": -1.0,
-        "casting.waste": -2.0,
-        "moulds.sprue_mm": 1e6,
-        "motor.drive": "up",
-        "estimate.tissue": "elbow",
-        "casting.room_c": "warm",
-        "layers.0.material": "butter",
-        "output.tolerance_mm": 0.0,
-    }
-    chosen = random.Random(name).sample(sorted(planted), 3)
-    data = read(name)
-    for path in chosen:
-        put(data, path, planted[path])
-    refused = refusal(data)
-    assert sorted(one.field for one in (refused, *refused.others)) == sorted(chosen)
-
-
-def test_at_follows_no_index_beyond_a_list():
-    data = {"a": [1, {"b": 2}]}
-    before = copy.deepcopy(data)
-    assert at(data, "a.1.b") == 2
-    assert [at(data, path) for path in ("a.2", "a.x", "a.1.c", "a.0.b", "b")] == [ABSENT] * 5
-    assert data == before
 
 
 def test_init_writes_no_python_and_names_the_schema_that_schema_writes(tmp_path, monkeypatch):

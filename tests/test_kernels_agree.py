@@ -198,7 +198,7 @@ def trees():
     return st.recursive(leaves(), grown, max_leaves=6)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), phases=WITHOUT_SHRINKING)
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), phases=WITHOUT_SHRINKING)
 @given(trees())
 def test_kernels_agree_on_random_trees(shape):
     """Where curved faces cross off their axes OCCT errs by 1e-7 mm: a volume by that times its area."""

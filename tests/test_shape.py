@@ -7,7 +7,6 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from unitcad.kernels.mesh import arrays, realise
@@ -19,7 +18,6 @@ from unitcad.shape import (
     content_hash,
     cut,
     cylinder,
-    exact_volume,
     mm,
     moved,
     polygon,
@@ -59,19 +57,6 @@ def test_lengths_lie_on_the_grid_and_sums_are_exact():
     assert mm(0.1) * 1024 == round(0.1 * 1024)
     assert mm(1.25) + mm(2.11) == mm(mm(1.25) + mm(2.11))
     assert rectangle(0, 0, 0.1, 1).vertices[1][0] == mm(0.1)
-
-
-@given(lengths, lengths, lengths)
-def test_revolved_volumes_have_a_closed_form(r, width, height):
-    assert exact_volume(ring(r, r + width, 0, height)) == pytest.approx(
-        math.pi * ((r + width) ** 2 - r**2) * height, rel=1e-12
-    )
-
-
-@given(st.floats(0.2, 20), st.integers(24, 200).map(lambda n: 8 * (n // 8)))
-def test_area_true_polygons_keep_a_cylinders_volume(radius, segments):
-    body = cylinder(radius, 0, 2)
-    assert realise(body, segments).volume() == pytest.approx(exact_volume(body), rel=1e-9)
 
 
 def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not():

@@ -91,8 +91,8 @@ def test_a_sideways_disc_on_the_forearm(medium, z):
     assert max(_off(medium, load, 785.0, r, z, (0.1, 1e-4, 1e-7, 1e-10))) <= 1
 
 
-SLOW = ("partly damped", "undamped")
-"""CI takes other media of every class (`python -m benchmarks.accuracy stability --quick`)."""
+SLOW = ("extreme contrast", "film on the forearm", "nearly fluid film", "partly damped", "undamped")
+"""Three of them are above. CI takes other media of every class (`python -m benchmarks.accuracy stability --quick`)."""
 
 
 @pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.long if one in SLOW else ()) for one in CLASSES])

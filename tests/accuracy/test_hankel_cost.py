@@ -2,23 +2,12 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from benchmarks.accuracy import hankel_cost
 from benchmarks.accuracy.hankel import RADII, cases
 
 FOREARM = cases()[0].medium
-
-
-@pytest.mark.parametrize("count", [4, 10, 100])
-def test_more_layers_are_the_same_forearm(count):
-    many = hankel_cost.cut(FOREARM, count)
-    assert len(many.layers) == count
-    load = hankel_cost.LOADS["disc, tangential"]
-    one, other = (medium.response(load, hankel_cost.OMEGA, RADII, rtol=1e-9) for medium in (FOREARM, many))
-    assert np.all(np.abs(one.u_r - other.u_r) <= one.error_r + other.error_r)
-    assert len(hankel_cost.cut(FOREARM, 1).layers) == 1
 
 
 def test_every_load_at_the_surface_and_at_depth_keeps_its_bound(monkeypatch):

@@ -57,11 +57,5 @@ def test_the_promises_fail_for_ranges_that_miss_and_probabilities_that_say_nothi
     assert p.size == met.size == 9 * len(suite.LEVELS)
 
 
-def test_the_suite_runs_and_keeps_its_promises():
-    result = suite.run(True, lambda line: None)
-    assert result.ok, [one for one in result.promises if not one.ok]
-    assert len(result.promises) == 3
-
-
 def test_how_many_ranges_held_is_what_an_estimate_says():
     assert sum(one.held for one in suite.leave_one_out("rule", measured_table())) == coverage()

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from benchmarks.accuracy import extremes
 from benchmarks.accuracy.runner import JOURNALS
-from tests.in_process import unitcad
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Seeded, random_spec, seeded_spec
 from unitcad.accuracy.survey import (
     BUILT,
@@ -24,7 +23,6 @@ from unitcad.accuracy.survey import (
 from unitcad.checks import check_moulds
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.spec.toml import text_of
 from unitcad.validation import from_data
 
 EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "6"))
@@ -82,19 +80,6 @@ def test_nearest_values_lead_to_a_build_or_another_limit():
             assert after is None or (after.field, after.limit) != (refusal.field, refusal.limit), (seed, str(after))
         else:
             pytest.fail(f"seed {seed}: the nearest values never end")
-
-
-@pytest.mark.parametrize(("seed", "ranges", "code"), [(1, "documented", 0), (0, "extreme", 2)])
-def test_the_command_ends_as_the_outcome_says(seed, ranges, code, tmp_path):
-    """Check that a user gets what the study gets from functions: exit 0, or 2 and the field named."""
-    data = seeded_spec(seed, ranges)
-    (tmp_path / "spec.toml").write_text(text_of(data), "utf-8")
-    done = unitcad("build", "spec.toml", cwd=tmp_path)
-    refused = refusal_of(data)
-    assert done.returncode == code == (2 if refused else 0), done.stderr
-    if refused:
-        assert refused.field in done.stderr
-        assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
 
 def test_the_docs_have_the_documented_ranges():

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import itertools
 import math
 import re
 import time
@@ -16,14 +15,13 @@ from unitcad.arrays.circuit import (
     circuit_body,
     circuit_dxf,
     circuit_svg,
-    kicad_board,
     outline,
     pad_table,
     wiring,
 )
 from unitcad.errors import Refusal
 from unitcad.shape import Profile, exact_volume, mm
-from unitcad.shape.profile import arc_centre, points, sides
+from unitcad.shape.profile import points
 
 LAYOUTS = {
     "grid": ({"kind": "grid", "columns": 3, "rows": 3, "pitch_mm": 20.0}, {}),
@@ -123,26 +121,6 @@ def test_the_dxf_holds_the_outline_exactly_and_has_the_same_bytes_again():
     time.sleep(1.1)
     assert circuit_dxf(wiring(made("hexagon")), outline(made("hexagon"))) == data
     assert not ezdxf.options.write_fixed_meta_data_for_testing
-
-
-def test_the_kicad_board_has_one_closed_edge():
-    array = ARRAYS["grid"]
-    drawn = outline(array)
-    text = kicad_board(wiring(array), drawn).decode()
-    assert text.count("(") == text.count(")")
-    cuts = [line for line in text.splitlines() if "Edge.Cuts" in line and "gr_" in line]
-    ends = [re.findall(r"\((?:start|end) (\S+ \S+)\)", line) for line in cuts]
-    assert all(one[1] == other[0] for one, other in itertools.pairwise([*ends, ends[0]]))
-    assert len(cuts) == len(drawn.vertices)
-    arcs = [line for line in cuts if "gr_arc" in line]
-    for line, (start, end) in zip(arcs, [s for s in sides(drawn.vertices) if s[0][2]], strict=True):
-        p, m, q = (
-            np.array(re.search(rf"\({key} (\S+) (\S+)\)", line).groups(), float) for key in ("start", "mid", "end")
-        )
-        radius = arc_centre(start[:2], end[:2], start[2])[2]
-        a, b, c = (np.linalg.norm(v) for v in (p - m, m - q, q - p))
-        area = abs((m - p)[0] * (q - p)[1] - (m - p)[1] * (q - p)[0]) / 2
-        assert a * b * c / 4 / area == pytest.approx(radius, rel=1e-3)
 
 
 def test_svg_and_table_name_every_motor():

@@ -12,7 +12,6 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit import outline
 from unitcad.arrays.crosstalk import (
-    MOST_LOADED,
     crosstalk,
     crosstalk_csv,
     crosstalk_lines,
@@ -23,8 +22,6 @@ from unitcad.arrays.crosstalk import (
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.inputs import tissue_medium
-from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
-from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 
 UNIT = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
@@ -39,7 +36,7 @@ def grid(columns, rows, pitch, **tables):
 
 
 NINE = grid(3, 3, 20.0)
-DATA = crosstalk(NINE, masses=True)
+DATA = crosstalk(NINE)
 
 
 def scattered():
@@ -142,27 +139,6 @@ def test_round_a_limb_distances_are_arcs_and_the_ends_of_a_ring_are_neighbours()
     assert found[0, 4] == pytest.approx(4 * arc, abs=2e-3)
     assert found.max() <= math.pi * 40 + 1e-3
     assert "arc" in crosstalk(ring, band=())["distances"]
-
-
-def test_masses_are_those_of_a_row_that_was_worked_out_unit_by_unit():
-    row = grid(3, 1, 18.0)
-    variant = estimate_input(row.unit)
-    mass, omega = unit_mass(variant).middle, 2 * math.pi * variant.frequency.middle
-    patches = [Patch(i * 18e-3, 0.0, variant.diameter / 2, 0.0) for i in range(3)]
-    g, forces = influence(tissue_medium(variant.tissue), patches, omega), np.zeros((3, 3), dtype=complex)
-    forces[0] = FORCES[variant.drive]
-    bare, loaded = (np.linalg.norm(motion(g, [each] * 3, forces, omega), axis=1) for each in (0.0, mass))
-    changes = loaded / loaded[0] / (bare / bare[0])
-    # What the outer units do to the middle one, by symmetry.
-    data = crosstalk(row, band=(), masses=True)["masses"]
-    assert data["mass_g"] == pytest.approx([1e3 * mass] * 3, rel=1e-5)
-    assert data["sum_changes_by"][1] == pytest.approx(changes[1], rel=5e-3)
-    assert data["sum_changes_by"][0] == data["sum_changes_by"][2]
-
-
-def test_more_units_than_their_masses_can_be_worked_out_for_are_refused():
-    with pytest.raises(Refusal, match=str(MOST_LOADED)):
-        crosstalk(grid(11, 10, 20.0), band=(), masses=True)
 
 
 def test_a_single_unit_has_no_neighbour():

@@ -245,36 +245,12 @@ def test_a_table_over_frequencies_has_both_drives():
         assert row[f"{drive}_over_edge"]["at_10_mm"] == pytest.approx(expected, rel=5e-3)
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["encapsulating", "--model", "publishd"],
-        ["encapsulating", "--set", "layers.0.material=butter"],
-        ["encapsulating", "--set", "estimate.tissue=elbow"],
-        ["encapsulating", "--set", "motor.part=VC9"],
-    ],
-)
-def test_refusals_exit_2_in_one_line(arguments):
-    done = unitcad("estimate", *arguments)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.startswith("error: ")
-    assert len(done.stderr.splitlines()) == 1
-
-
 @pytest.mark.parametrize("model", ["crossings", "layered", "baseline"])
 def test_a_model_that_gives_no_estimate_is_refused_with_those_that_do(model):
     refused = run("encapsulating", "--model", model).exception
     assert isinstance(refused, Refusal)
     for name in ("rule", "divider", "published", "corrected", "fem", "all"):
         assert name in refused.limit
-
-
-def test_layered_block_reads_no_silicone():
-    first, second = (
-        estimate_spec(pair("encapsulating", *materials))["layered"] for materials in ((SOFT, STIFF), (STIFF, SOFT))
-    )
-    assert first == second
 
 
 @pytest.mark.parametrize(("hertz", "said"), [([50.0, 100.0], (None, 50, 100)), ([60.0], (60, 60, 60))])

@@ -11,7 +11,6 @@ import pytest
 import unitcad
 from unitcad import attenuation
 from unitcad.attenuation import layered
-from unitcad.attenuation.layered.medium import Stack
 from unitcad.errors import Refusal, UnitcadError
 
 PACKAGE = Path(unitcad.__file__).parent
@@ -20,17 +19,6 @@ PACKAGE = Path(unitcad.__file__).parent
 def test_the_example_of_the_docstring_runs():
     done = doctest.testmod(layered)
     assert done.attempted > done.failed == 0
-
-
-def test_a_stack_with_a_loss_has_at_least_that_in_every_body():
-    some = attenuation.LayeredMedium(
-        [attenuation.Layer(1e-3, 1000, 1e5, 0.4), attenuation.Layer(0.0, 1000, 1e3, 0.4, attenuation.KelvinVoigt(1.0))],
-        attenuation.HalfSpace(1000, 1e4, 0.4),
-    )
-    losses = [m.shear.imag / m.shear.real for m in some.with_loss(0.25).materials(785.0)]
-    assert losses == pytest.approx([0.25, 2.198, 0.25], rel=1e-3)
-    assert isinstance(some, Stack)
-    assert some.without_empty_layers().layers == some.layers[:1]
 
 
 BASE = attenuation.HalfSpace(1000, 1e4, 0.4)

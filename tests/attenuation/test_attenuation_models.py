@@ -169,25 +169,6 @@ def test_a_class_without_units_has_the_mean_of_the_others():
     assert level == pytest.approx(np.exp(np.mean(np.log(table.levels[kept]))), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("model", "levels", "leave_one_out", "worst", "directions"),
-    [
-        ("rule", None, 1.29, 1.76, None),
-        ("baseline", None, 1.327, 1.76, 12),
-        ("crossings", 1.30, 1.35, None, 12),
-        ("divider", 1.25, 1.33, None, 12),
-        ("published", None, 1.70, None, 12),
-    ],
-)
-def test_what_was_found_before(model, levels, leave_one_out, worst, directions):
-    """Figures that were found by other programs."""
-    found = assessments()[model]
-    assert found.leave_one_out.geometric_mean == pytest.approx(leave_one_out, abs=0.006)
-    for own, before in ((found.levels.geometric_mean, levels), (found.leave_one_out.worst, worst)):
-        assert before is None or own == pytest.approx(before, abs=0.006)
-    assert directions in (None, found.directions)
-
-
 def test_the_rule_between_equal_moduli_and_the_measured_ratio():
     """From s to s q^n in the logarithm of the ratio; then s q^n; s where the inside is stiffer."""
     s, q = stored()["rule"].values()

@@ -7,7 +7,6 @@ from unitcad.attenuation import HalfSpace, KelvinVoigt, LayeredMedium, UniformDi
 from unitcad.attenuation.curve import decay
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import MOST_SOLVED, components
-from unitcad.attenuation.receivers import Patch, influence
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
@@ -46,18 +45,3 @@ def test_decay_of_many_distances_is_that_of_each_alone(drive, reading):
     rows = np.array([decay(UNIT, row, drive, 250.0, reading=reading) for row in r])  # type: ignore[arg-type]
     assert np.max(np.abs(whole - rows)) < 5e-4
     assert decay(UNIT, np.array([7e-3]), drive, 250.0, reading=reading)[0] == pytest.approx(1.0)  # type: ignore[arg-type]
-
-
-def test_units_out_of_line_load_the_skin_as_pairs_do():
-    """Twenty places of no regularity, by one curve: each pair as `influence` of the two alone, and G is reciprocal."""
-    rng, places = np.random.default_rng(5), []
-    while len(places) < 20:
-        x, y = rng.uniform(0, 0.12, 2)
-        if all(np.hypot(x - p.x, y - p.y) > 14.01e-3 for p in places):
-            places.append(Patch(x, y, 7e-3, 1e-3))
-    g = influence(FOREARM, places, 800.0)
-    for i, j in ((0, 1), (3, 17), (12, 5)):
-        pair = influence(FOREARM, (places[i], places[j]), 800.0)
-        assert np.max(np.abs(g[np.ix_([i, j], range(3), [i, j], range(3))] - pair)) < 1e-3 * np.max(np.abs(g))
-    flat = g.reshape(60, 60)
-    assert np.max(np.abs(flat - flat.T)) < 1e-3 * np.max(np.abs(flat))

@@ -1,15 +1,11 @@
 """An estimate by quasi-static moduli has the constants, errors, order and range of the nine units by such moduli."""
 
-import json
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import published_path
 from unitcad.attenuation.edge.measured import measured_table, whole_ratio
 from unitcad.catalogue import materials
-from unitcad.cli import app
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load
 
@@ -64,11 +60,3 @@ def test_the_level_has_the_constant_fitted_with_such_moduli():
     at = table.names.index("embedded E10/D30")
     level = estimate_spec(spec)["models"]["published"]["edge_level"]["value"]
     assert level == pytest.approx(s * path[at], rel=1e-4)
-
-
-def test_the_terminal_and_the_json_say_it():
-    args = ["estimate", "embedded", "--set", "estimate.moduli=quasi-static"]
-    assert "error: factor 2.0" in CliRunner().invoke(app, args).stdout
-    assert "slow pull" in CliRunner().invoke(app, [*args, "--details"]).stdout
-    data = json.loads(CliRunner().invoke(app, [*args, "--json"]).stdout)
-    assert data["answer"]["typical_error"] == pytest.approx(1.29, abs=0.006)

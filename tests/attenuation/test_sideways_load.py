@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import special
 
-from unitcad.attenuation import HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor, Point, UniformDisc
+from unitcad.attenuation import HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor, Point
 from unitcad.attenuation.layered.loads import bessel_bounds, bessels
 
 NU, E = 0.3, 3e4
@@ -41,28 +41,6 @@ def test_a_point_force_is_cerrutis(z):
     for value, exact in ((response.u_r, ahead[0]), (-response.u_theta, beside[0]), (response.u_z, ahead[2])):
         assert np.max(np.abs(value - exact)) <= response.error
     assert response.error < 1e-9 * np.max(np.abs(ahead))
-
-
-@pytest.mark.parametrize("z", [0.0, 1e-3])
-@pytest.mark.parametrize("r", [0.0, 2e-3, 5e-3, 3e-2])
-def test_a_disc_is_cerruti_summed_over_it(r, z):
-    a = 3.5e-3
-    response = BODY.response(UniformDisc(a, "tangential"), 0.0, [r], z=z, rtol=1e-10)
-    ahead, beside = (_disc_by_points(a, r * np.array(way), z) for way in ((1, 0), (0, 1)))
-    for value, exact in ((response.u_r, ahead[0]), (-response.u_theta, beside[0]), (response.u_z, ahead[2])):
-        assert abs(value[0] - exact) < 1e-9 * abs(ahead[0])
-
-
-def _disc_by_points(a, at, z):
-    """Sum over a disc of radius a under 1 Pa: about the point `at` if it lies inside, else about the disc's centre."""
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    turn = np.linspace(0, 2 * np.pi, 800, endpoint=False)
-    way = np.array([np.cos(turn), np.sin(turn)])
-    inside = at @ at < a * a
-    end = -at @ way + np.sqrt((at @ way) ** 2 + a * a - at @ at) if inside else np.full(turn.shape, a)
-    rho = end * (nodes[:, None] + 1) / 2
-    x, y = (-rho * one if inside else place - rho * one for one, place in zip(way, at, strict=True))
-    return np.einsum("cnt,n,t->c", _cerruti(x, y, z) * rho, weights, end / 2 * 2 * np.pi / turn.size)
 
 
 @pytest.mark.parametrize("z", [0.0, 3e-3])

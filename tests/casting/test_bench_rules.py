@@ -41,10 +41,6 @@ def without_pictures(made):
     return of_first_pour(made, lambda pour: replace(pour, steps=tuple(replace(s, picture="") for s in pour.steps)))
 
 
-def unlevelled(made):
-    return replace(made, preparation=tuple(step for step in made.preparation if "Level" not in step.title))
-
-
 def opened_first(made):
     def change(pour):
         cure = [step for step in pour.steps if step.kind == "cure"]
@@ -59,12 +55,6 @@ def short_cure(made):
         lambda pour: replace(
             pour, steps=tuple(replace(s, wait_min=s.wait_min / 2) if s.kind == "cure" else s for s in pour.steps)
         ),
-    )
-
-
-def untested_cure(made):
-    return of_first_pour(
-        made, lambda pour: replace(pour, steps=tuple(replace(s, text=s.text.replace(TACK, "")) for s in pour.steps))
     )
 
 
@@ -86,27 +76,19 @@ def no_grip(made):
     return replace(made, preparation=tuple(replace(s, text="") for s in made.preparation))
 
 
-def reworded(made, old, new):
+def reworded(old, new):
     def change(pour):
         return replace(pour, steps=tuple(replace(s, text=s.text.replace(old, new)) for s in pour.steps))
 
-    return replace(made, pours=tuple(map(change, made.pours)))
+    return lambda made: replace(made, pours=tuple(map(change, made.pours)))
 
 
-def unpropped(made):
-    return reworded(made, "stacked card", "nothing")
+greased_with_nothing_named = reworded("petroleum jelly", "something")
+tilted_by_tape = reworded(LEVEL_AGAIN, "")
 
 
-def looks_through_layer_1(made):
-    return reworded(made, "under Layer 1,", "no gap at the core, none under it,")
-
-
-def spatula_forgotten(made):
-    return replace(made, bill=tuple(item for item in made.bill if "spatula" not in item.item))
-
-
-def varnish_forgotten(made):
-    return replace(made, bill=tuple(item for item in made.bill if "varnish" not in item.item))
+def unbought(word):
+    return lambda made: replace(made, bill=tuple(item for item in made.bill if word not in item.item))
 
 
 def no_time_to_prepare(made):
@@ -123,10 +105,6 @@ def ring_not_bought(made):
 def adhesive_in_a_hurry(made):
     *steps, cure = made.assembly
     return replace(made, assembly=(*steps, replace(cure, wait_min=60 * made.pours[-1].cure_h)))
-
-
-def tilted_by_tape(made):
-    return reworded(made, LEVEL_AGAIN, "")
 
 
 def coated_before_mixed(made):
@@ -148,10 +126,6 @@ def greased_too_late(made):
         return replace(pour, steps=(*rest[: on + 1], *grease, *rest[on + 1 :]))
 
     return replace(made, pours=tuple(map(change, made.pours)))
-
-
-def greased_with_nothing_named(made):
-    return reworded(made, "petroleum jelly", "something")
 
 
 def pulled_on_the_bench(made):
@@ -189,18 +163,22 @@ PLANTED = {
     "tape under the plate": (("encapsulating",), tilted_by_tape, "look at the level again"),
     "lids' bands": (LIDS, tilted_by_tape, "look at the level again"),
     "a coat before the mix": (FILM, coated_before_mixed, "uses the mix before"),
-    "grip hangs": (("encapsulating",), unpropped, "nothing bears"),
-    "ledge under Layer 1": (("three-layer",), looks_through_layer_1, "pour 2: asks to look"),
-    "no spatula": (("embedded",), spatula_forgotten, "blunt spatula"),
-    "no varnish": (RESIN, varnish_forgotten, "acrylic varnish"),
+    "grip hangs": (("encapsulating",), reworded("stacked card", "nothing"), "nothing bears"),
+    "ledge under Layer 1": (
+        ("three-layer",),
+        reworded("under Layer 1,", "no gap at the core, none under it,"),
+        "pour 2: asks to look",
+    ),
+    "no spatula": (("embedded",), unbought("spatula"), "blunt spatula"),
+    "no varnish": (RESIN, unbought("varnish"), "acrylic varnish"),
     "no preparation": (RESIN, no_time_to_prepare, "Wash: takes no time"),
     "ring not bought": (LOOSE, ring_not_bought, "the bill lacks silicone"),
     "adhesive not cured for a day": (("encapsulating",), adhesive_in_a_hurry, "another's time"),
     "no picture": (("encapsulating",), without_pictures, "has no picture"),
-    "not levelled": (("encapsulating",), unlevelled, "levelled"),
+    "not levelled": (("encapsulating",), without_step("Level the"), "levelled"),
     "opened before the cure": (("encapsulating",), opened_first, "opened before the cure"),
     "cured too short": (("encapsulating",), short_cure, "less than the silicone takes"),
-    "tacky is not told": (("embedded",), untested_cure, "tacky"),
+    "tacky is not told": (("embedded",), reworded(TACK, ""), "tacky"),
     "adhesive not cured": (("encapsulating",), adhesive_left_wet, "what holds the motor is not cured"),
     "too little mixed": (("encapsulating",), too_little, "mixes less"),
     "syringe holds back": (LIDS, syringe_forgotten, "syringe holds back"),

@@ -251,17 +251,6 @@ def test_a_tail_that_leads_through_a_closed_slot_is_shown_in_place_only():
     assert "motor-in" in views(planned("embedded")[0])
 
 
-def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes():
-    moulds, casting = planned("encapsulating", "moulds.printer=sla")
-    tongue = moulds.solids["tongue"].bounding_box()
-    exit = moulds.dimensions.exit
-    assert tongue[4] - tongue[1] == pytest.approx(exit.width, abs=0.01)
-    steps = {step.title: step.picture for step in casting.preparation}
-    assert steps["Cut the tongues"] == picture_path("cut-tongue")
-    printed = planned("encapsulating")[0].solids["tongue"].bounding_box()
-    assert printed[4] - printed[1] == pytest.approx(10.0, abs=0.01)
-
-
 OF_EVERY_SET = (
     test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn,
     test_views_name_pieces_that_there_are,

@@ -230,18 +230,6 @@ def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path):
     assert broken(moulds) == set()
 
 
-def test_a_build_writes_moulds_and_casting(tmp_path):
-    done = built(tmp_path, lugs(), "unit", "moulds", "casting", "estimate", layers=2)
-    assert done.ok
-    assert done.manifest["outputs"] == ["unit", "moulds", "casting"]
-    assert {"casting.md", "moulds/base.stl", "moulds/step2-cup.stl"} <= set(done.manifest["files"])
-    reasons = {left["output"]: left["reason"] for left in done.manifest["skipped"]}
-    assert reasons["estimate"].startswith("the models describe")
-    first, second = (done.folder / "casting.md").read_text("utf-8").split("## Pour 2")
-    assert "in the blade's way" in first  # the lugs' supports are as high in pour 1 as in pour 2
-    assert "in the blade's way" not in second
-
-
 @pytest.mark.parametrize("earlier", [False, True])
 def test_only_an_estimate_is_refused_beside_a_result_too(earlier, tmp_path):
     if earlier:

@@ -25,6 +25,7 @@ def test_every_template_passes_every_mould_check(name):
     assert max(balance) < 1e-12
 
 
+@pytest.mark.long
 def test_a_wedge_that_a_union_of_many_loses_is_no_leak():
     """One of 10,000 random specs: with a circle in 328 sides, manifold3d's union of the tools lacks 0.025 mm3."""
     layers = [
@@ -47,7 +48,7 @@ def test_a_wedge_that_a_union_of_many_loses_is_no_leak():
 
 
 VARIANTS = [
-    ("encapsulating", "moulds.cavities=[2,3]"),
+    ("encapsulating", "moulds.cavities=[1,2]"),
     ("encapsulating", "moulds.pour=injected"),
     ("encapsulating", "moulds.printer=sla"),
     ("encapsulating", "moulds.printer=fdm-0.25", "moulds.cavities=[2,1]"),
@@ -59,7 +60,7 @@ VARIANTS = [
     ("encapsulating", "motor.fill=true", "motor.lip_mm=0.4", "moulds.draft_deg=1", "moulds.pour=injected"),
     ("encapsulating", "moulds.shrinkage_percent=2", "motor.lip_mm=0.5", "skin_mm=0.5"),
     ("encapsulating", "moulds.bore_compensation_mm=0.1", "moulds.draft_deg=1"),
-    ("embedded", "moulds.cavities=[2,3]", "moulds.pour=injected"),
+    ("embedded", "moulds.cavities=[2,1]", "moulds.pour=injected"),
     ("embedded", "motor.fill=true", "moulds.printer=sla"),
     ("embedded", "motor.lip_mm=0.5", "moulds.draft_deg=2"),
     ("embedded", "moulds.shrinkage_percent=0.3", "moulds.cavities=[2,2]"),

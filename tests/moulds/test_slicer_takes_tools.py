@@ -48,10 +48,6 @@ def written(folder, *source):
     return files
 
 
-def sliced(files):
-    return slicer.print_report(files, printers()["fdm-0.4"], {}, list[str]().append)
-
-
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
 def test_no_tool_needs_a_repair(source, tmp_path):
     files = written(tmp_path, *source)
@@ -91,18 +87,6 @@ def test_a_broken_mesh_needs_one(tmp_path):
     (tmp_path / "text.stl").write_text("nothing")
     with pytest.raises(UnitcadError, match="does not read"):
         slicer.needs_repair(tmp_path / "text.stl")
-
-
-def test_print_time_and_filament(tmp_path):
-    """Filament by volume lies between the walls alone and the solid piece."""
-    (tongue,) = (file for file in written(tmp_path, "encapsulating") if file.name == "tongue.stl")
-    report = sliced([tongue])
-    assert report["pieces"][0]["repaired"] is False
-    assert 10 < report["print_s"] < 3600
-    moulds = set_of("encapsulating")
-    solid = realise(moulds.plan.tool("tongue").shape, moulds.segments).volume() / 1000
-    # A skirt round the piece comes on top.
-    assert 0.5 * solid < report["filament_cm3"] < 5 * solid
 
 
 @pytest.mark.smoke

@@ -23,6 +23,9 @@ NAMESPACE = "http://www.w3.org/1999/xhtml"
 """Of HTML's elements: a name in three.js, which no browser opens."""
 
 
+QUICK = ("no-fpcb", "three-layer")
+
+
 def resolved(node, pool):
     if isinstance(node, list):
         return [resolved(item, pool) for item in node]
@@ -223,7 +226,9 @@ def changed(node, factor):
     return float(f"{node * factor:.9g}") if isinstance(node, float) else node
 
 
-@pytest.mark.parametrize("name", sorted(templates()))
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.long) for name in sorted(templates())]
+)
 def test_every_template_has_a_page(name, tmp_path):
     store = MemoryStore()
     folder = build(load(name, ['output.formats=["stl"]']), tmp_path, check=False, store=store).folder

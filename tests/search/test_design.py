@@ -13,7 +13,6 @@ from tests.in_process import unitcad
 from tests.refusals import refuses
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.edge.ranges import predictive_of
-from unitcad.attenuation.receivers import unit_mass
 from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
@@ -81,12 +80,15 @@ def test_each_candidate_is_what_its_spec_is_alone(found):
         alone = predictive_of([variant])
         assert found.probability[row] == pytest.approx(alone.at_most(0.06)[0], abs=1e-9)
         assert found.predictive.quantile(0.9)[row] == pytest.approx(alone.quantile(0.9)[0], rel=1e-6)
-        assert found.mass_g[row] == pytest.approx(1e3 * unit_mass(variant).middle, rel=1e-9)
         assert found.diameter_mm[row] == spec.diameter_mm
         made = procedure(MouldSet(spec), [400.0] * len(spec.layers), 9e3)
         steps = [*(step for pour in made.pours for step in pour.steps), *made.release]
         assert found.cure_hours[row] == pytest.approx(sum(step.minutes + step.wait_min for step in steps) / 60)
         moulds = MouldSet(spec)
+        silicone = [moulds.mesh(body).volume() for body in moulds.unit if body.kind == "layer"]
+        densities = [layer.density for layer in estimate_input(spec).layers]
+        grams = 1e3 * variant.geometry.motor_mass.middle + 1e-6 * float(np.dot(silicone, densities))
+        assert found.mass_g[row] == pytest.approx(grams, rel=0.03)
         top = max(bounds(moulds.mesh(body))[5] for body in moulds.unit)
         assert found.height_mm[row] == pytest.approx(top, abs=0.02)
 

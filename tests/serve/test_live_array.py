@@ -26,19 +26,22 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.server import serve
 from unitcad.validation import templates
 
-TEXT = array_templates()["forearm-pockets"].read_text("utf-8")
+NINE = array_templates()["forearm-pockets"].read_text("utf-8")
+TEXT = NINE.replace("rows = 3", "rows = 1").replace("26.0", "8.0")
 UNIT = re.compile(r"^unit = .*$", re.MULTILINE)
 CAMPAIGN = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
 
 
 @pytest.fixture(scope="module")
 def pockets(tmp_path_factory):
-    with serving(tmp_path_factory.mktemp("array"), "forearm-pockets") as server:
+    folder = tmp_path_factory.mktemp("array")
+    (folder / "pockets.toml").write_text(TEXT)
+    with serving(folder, "pockets.toml") as server:
         yield server
 
 
 def test_answers_are_those_of_the_commands(pockets):
-    array = load_array("forearm-pockets", ["layout.pitch_mm=22.0"])
+    array = load_array(tomllib.loads(TEXT), ["layout.pitch_mm=22.0"])
     edit = [{"path": "layout.pitch_mm", "value": 22.0}]
     patch = pockets.ask(TEXT, "unit", edit)
     assert base64.b64decode(patch["model"]["unit"]) == patch_glb(patch_moulds(array).blank, patch_parts(array))
@@ -75,15 +78,15 @@ def test_every_fault_of_an_array_is_told(pockets):
 def test_a_tail_that_a_pitch_leaves_no_way_is_refused_at_the_pitch(pockets):
     """Both values offered are accepted: that of the pitch, and that of the unit, whose template stays named."""
     narrow = [{"path": "layout.pitch_mm", "value": 17.0}]
-    message = {"text": TEXT, "edits": narrow, "since": [{"path": "layout.pitch_mm", "value": 20.0}]}
+    message = {"text": NINE, "edits": narrow, "since": [{"path": "layout.pitch_mm", "value": 20.0}]}
     fault = json.loads(pockets.send("/ask", message)[1])["faults"][0]
     assert (fault["field"], fault["at"]) == ("unit.fpcb.tail_length_mm", "layout.pitch_mm")
-    assert "faults" not in pockets.ask(TEXT, "unit", [{"path": fault["at"], "value": fault["at_nearest"]}])
-    shorter = pockets.ask(TEXT, "unit", [*narrow, {"path": fault["field"], "value": fault["nearest"]}])
+    assert "faults" not in pockets.ask(NINE, "unit", [{"path": fault["at"], "value": fault["at_nearest"]}])
+    shorter = pockets.ask(NINE, "unit", [*narrow, {"path": fault["field"], "value": fault["nearest"]}])
     assert "faults" not in shorter
     asked = tomllib.loads(shorter["text"])
     assert asked["unit"] == {"like": "encapsulating", "fpcb": {"tail_length_mm": fault["nearest"]}}
-    assert asked["layout"] == tomllib.loads(TEXT)["layout"] | {"pitch_mm": 17.0}
+    assert asked["layout"] == tomllib.loads(NINE)["layout"] | {"pitch_mm": 17.0}
     assert "# a template, a spec file, or a table" in shorter["text"]
 
 
@@ -152,7 +155,7 @@ def test_a_patch_is_shown_and_changed(browser, pockets):
     assert "along x" in live.page.inner_text('.stage select[name="axis"]')
     live.page.check('.stage input[value="moulds"]')
     shown = live.page.get_attribute(".stage-host", "data-shown").split()
-    assert {tool.name for tool in patch_moulds(load_array("forearm-pockets")).plan.tools} < set(shown)
+    assert {tool.name for tool in patch_moulds(load_array(tomllib.loads(TEXT))).plan.tools} < set(shown)
     live.page.check('.stage input[value="unit"]')
     before = live.page.locator("#estimate img").first.get_attribute("src")
     live.choose('input[name="sheet.margin_mm"]', "5")
@@ -166,7 +169,7 @@ def test_a_patch_is_shown_and_changed(browser, pockets):
     columns = live.page.locator('.field[data-path="layout.columns"] input[type="range"]')
     columns.focus()
     live.pressed(columns, "ArrowLeft")
-    assert "units 6" in live.page.inner_text("#figures")
+    assert "units 2" in live.page.inner_text("#figures")
     # A unit in the patch's place is called one.
     live.start_from("encapsulating")
     assert radios.all_inner_texts() == ["Unit", "Moulds"]

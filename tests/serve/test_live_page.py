@@ -245,12 +245,12 @@ WORDS = """() => {
 
 @pytest.mark.smoke
 def test_save_and_build_from_the_page(browser, tmp_path):
-    with serving(tmp_path) as own:
+    with serving(tmp_path, "single-embedded") as own:
         visit = Live(browser, own)
         visit.page.click("text=As TOML text")
         visit.choose("#text", visit.page.input_value("#text") + '\n[output]\nformats = ["stl"]\n')
         visit.page.click("text=Save spec")
-        visit.until(lambda: (tmp_path / "encapsulating.toml").is_file())
+        visit.until(lambda: (tmp_path / "single-embedded.toml").is_file())
         visit.page.evaluate(WORDS)
         visit.page.get_by_role("button", name="Build this").press("Enter")
         visit.page.get_by_role("button", name="Cancel").focus()

@@ -44,7 +44,7 @@ BODIES = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def own(server):
     """The server, with a loop of links and a file that nobody may read among its results."""
     out = server.folder / "out"

@@ -132,7 +132,7 @@ def bytes_of(out):
     return {
         str(file.relative_to(out)): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(out.rglob("*"))
-        if file.is_file() and file.name not in apart
+        if file.is_file() and file.name not in apart and out / "store" not in file.parents
     }
 
 

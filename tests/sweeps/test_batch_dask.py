@@ -16,13 +16,14 @@ from batching import bytes_of, environment, made, ring_sweep, started, summary_o
 from process_trees import until
 
 from unitcad.errors import UnitcadError
-from unitcad.sweeps.executors import Certificates, Workers, dask_executor
+from unitcad.sweeps.executors import Workers, dask_executor
 
+dask = pytest.importorskip("dask")
 pytest.importorskip("distributed")
 
 
 class Cluster:
-    """Processes of the `dask` command; workers keep nothing on this disk but their own scratch folder."""
+    """Processes of the `dask` command, on this machine's disk."""
 
     def __init__(self, folder, *tls, workers=2):
         self.folder, self.workers = folder, []
@@ -67,18 +68,17 @@ def cluster(tmp_path):
 def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster, tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "slow", materials=3), tmp_path / "out"
     child = started("batch", sweep, "-o", out, "--scheduler", cluster.address, "--json")
-    until(lambda: len(list(out.glob("ring-*"))) > 2)
+    journal = out / "journal.jsonl"
+    until(lambda: journal.exists() and journal.read_bytes().count(b"\n") > 3)  # its head, three done
     cluster.workers[0].kill()
     output, errors = child.communicate(timeout=90)
     assert child.returncode == 0, errors
     summary = json.loads(output)
     assert (summary["ok"], summary["failed"]) == (12, 0)
     assert "Traceback" not in errors
-    assert not list((tmp_path / "cluster").rglob("*.stl"))  # results came back over the wire
     made(sweep, tmp_path / "here", cache=tmp_path / "other")
     assert bytes_of(out) == bytes_of(tmp_path / "here")
-    # Each geometry crossed once: the other materials came back as a few small files.
-    assert summary["reused"] == 8
+    assert summary["reused"] >= 7  # of four geometries in three materials; that of the killed worker may be made twice
 
 
 @pytest.mark.long
@@ -160,63 +160,62 @@ CERTIFICATES = Path(__file__).parent / "certificates"
 """Of two authorities, each with the certificate and key of a member; valid until 2126."""
 
 
+def _configured(ca, cert, key):
+    files = {"CA_FILE": ca, "CLIENT__CERT": cert, "CLIENT__KEY": key}
+    return {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(file) for name, file in files.items()}
+
+
 def _authority(name):
-    files = {"--tls-ca-file": "authority.pem", "--tls-cert": "member.pem", "--tls-key": "key.pem"}
-    return tuple(word for option, file in files.items() for word in (option, str(CERTIFICATES / name / file)))
+    return [CERTIFICATES / name / file for file in ("authority.pem", "member.pem", "key.pem")]
 
 
 @pytest.fixture(scope="module")
 def encrypted(tmp_path_factory):
-    ours = _authority("ours")
-    cluster = Cluster(tmp_path_factory.mktemp("cluster"), *ours, workers=1)
-    yield cluster, ours
+    options = zip(("--tls-ca-file", "--tls-cert", "--tls-key"), map(str, _authority("ours")), strict=True)
+    cluster = Cluster(tmp_path_factory.mktemp("cluster"), *(word for pair in options for word in pair), workers=1)
+    yield cluster
     cluster.close()
 
 
 @pytest.mark.long
 def test_a_cluster_behind_certificates_makes_the_same_bytes(encrypted, tmp_path):
-    cluster, ours = encrypted
-    assert cluster.address.startswith("tls://")
+    assert encrypted.address.startswith("tls://")
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2)
-    assert summary_of(sweep, "-o", tmp_path / "a", "--scheduler", cluster.address, *ours)["ok"] == 4
-    configured = {
-        "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": ours[1],
-        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT": ours[3],
-        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY": ours[5],
-    }
-    summary_of(sweep, "-o", tmp_path / "b", "--scheduler", cluster.address, env={**environment(), **configured})
+    env = {**environment(), **_configured(*_authority("ours"))}
+    assert summary_of(sweep, "-o", tmp_path / "a", "--scheduler", encrypted.address, env=env)["ok"] == 4
     made(sweep, tmp_path / "here", cache=tmp_path / "other")
-    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b") == bytes_of(tmp_path / "here")
+    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "here")
 
 
 @pytest.mark.long
 def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path):
-    cluster, ours = encrypted
-    others, sweep = _authority("others"), ring_sweep(tmp_path / "s", heights=[2.0])
-    for words in (others, (*ours[:2], *others[2:])):
-        done = unitcad("batch", sweep, "-o", tmp_path / "o", "--scheduler", cluster.address, *words)
+    ours, others = _authority("ours"), _authority("others")
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0])
+    for named in (others, (ours[0], *others[1:])):
+        env = {**environment(), **_configured(*named)}
+        done = unitcad("batch", sweep, "-o", tmp_path / "o", "--scheduler", encrypted.address, env=env)
         assert done.returncode == 2, done.stderr
-        assert done.stderr.startswith(f"error: --scheduler {cluster.address}: ")
+        assert done.stderr.startswith(f"error: --scheduler {encrypted.address}: ")
         assert len(done.stderr.splitlines()) == 1
         assert not (tmp_path / "o" / "variants.csv").exists()
 
 
 @pytest.mark.parametrize(
-    ("address", "files", "message"),
+    ("text", "message"),
     [
-        ("tls://127.0.0.1:9", [], "needs --tls-ca-file, --tls-cert and --tls-key"),
-        ("tls://127.0.0.1:9", ["none.pem"], "--tls-ca-file = '{}/none.pem': no such file"),
-        ("tls://127.0.0.1:9", ["text", "text", "text"], "the certificates can't be used: "),
-        ("tcp://127.0.0.1:9", ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),
-        (None, ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),
+        (None, "needs certificates in Dask's configuration"),
+        ("no certificate\n", "the certificates can't be used: "),
     ],
 )
-def test_certificates_that_can_not_be_used(address, files, message, tmp_path):
-    (tmp_path / "text").write_text("no certificate\n")
-    opened = Workers(None, address, Certificates(*(tmp_path / file for file in files))).executor()
-    with pytest.raises(UnitcadError) as error, opened:
-        pass
-    assert message.format(tmp_path) in str(error.value)
+def test_certificates_that_can_not_be_used(text, message, tmp_path):
+    file, named = tmp_path / "text", dict[str, str]()
+    if text is not None:
+        file.write_text(text)
+        named = {"ca-file": str(file), "client.cert": str(file), "client.key": str(file)}
+    with dask.config.set({f"distributed.comm.tls.{key}": value for key, value in named.items()}):
+        opened = Workers(None, "tls://127.0.0.1:9").executor()
+        with pytest.raises(UnitcadError, match=message), opened:
+            pass
 
 
 BENCH = Path(__file__).parents[2] / "benchmarks" / "bench_nodes.py"

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
+from unitcad.sweeps import journal as journal_module
 from unitcad.sweeps.journal import BatchHead, Journal, JournalEntry
 
 
@@ -96,30 +97,31 @@ def _entry(index, reason="r"):
 
 
 def test_the_last_line_of_a_variant_counts_and_the_order_is_the_sweep_s(tmp_path):
-    journal = Journal(tmp_path / "o", HEAD, "1")
+    journal = Journal(tmp_path / "o", HEAD)
     for index in (3, 0, 5, 3):
         journal.add(_entry(index, reason=f"{index} {len(list(journal.entries()))}"))
     assert [(entry.index, entry.reason) for entry in journal.entries()] == [(0, "0 1"), (3, "3 3"), (5, "5 2")]
     journal.close()
-    again = Journal(tmp_path / "o", HEAD, "1")
+    again = Journal(tmp_path / "o", HEAD)
     assert [entry.reason for entry in again.entries()] == ["0 1", "3 3", "5 2"]
     assert again.entry(1) is None
     assert again.entry(99) is None
     again.close()
 
 
-def test_other_code_starts_anew_and_another_batch_is_refused(tmp_path):
-    journal = Journal(tmp_path / "o", HEAD, "1")
+def test_other_code_starts_anew_and_another_batch_is_refused(tmp_path, monkeypatch):
+    journal = Journal(tmp_path / "o", HEAD)
     journal.add(_entry(0))
     journal.close()
     with pytest.raises(UnitcadError, match="another batch"):
-        Journal(tmp_path / "o", replace(HEAD, batch="c"), "1")
-    newer = Journal(tmp_path / "o", HEAD, "2")
+        Journal(tmp_path / "o", replace(HEAD, batch="c"))
+    monkeypatch.setattr(journal_module, "code_version", lambda: "2")
+    newer = Journal(tmp_path / "o", HEAD)
     assert list(newer.entries()) == []
     newer.close()
     (tmp_path / "o" / "journal.jsonl").write_text("nonsense\n")
     with pytest.raises(UnitcadError, match="no journal"):
-        Journal(tmp_path / "o", HEAD, "1")
+        Journal(tmp_path / "o", HEAD)
 
 
 def test_other_options_are_another_batch(tmp_path):

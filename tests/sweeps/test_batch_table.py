@@ -1,4 +1,4 @@
-"""Estimate-only sweeps: the arrays give what a plain loop over single estimates gives, variant by variant."""
+"""Estimate-only sweeps: the table has what single estimates give, variant by variant."""
 
 import csv
 import json
@@ -8,7 +8,7 @@ import pytest
 from batching import bytes_of, unitcad
 
 from unitcad.attenuation.edge.estimates import summary
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.sweeps import BatchOptions, estimate_table
 from unitcad.sweeps.sweep import from_file
@@ -70,8 +70,7 @@ def _rows(sweep, out):
 
 
 @pytest.mark.parametrize("name", SWEEPS)
-def test_the_table_is_what_single_estimates_give(name, tmp_path, monkeypatch):
-    monkeypatch.setattr(estimate_table, "BLOCK", 7)  # so that blocks end in the middle of an axis
+def test_the_table_is_what_single_estimates_give(name, tmp_path):
     sweep = _sweep(name)
     rows = _rows(sweep, tmp_path / "o")
     assert len(rows) == sweep.count
@@ -88,8 +87,6 @@ def test_the_table_is_what_single_estimates_give(name, tmp_path, monkeypatch):
                 assert row[f"edge_{model}"] == pytest.approx(single, rel=1e-5)
                 numbers += 1
     assert numbers >= len(rows)  # not a table of nothing
-    if name == "free axes":
-        assert estimate_table._free_axes(sweep) == [1, 2]
 
 
 def test_what_validation_refuses_is_refused_here(tmp_path):
@@ -121,10 +118,19 @@ def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path):
     assert unitcad("batch", "thickness", "--only", "estimate", "-o", tmp_path / "a").returncode == 2
 
 
-def test_a_hundred_thousand_variants_are_validated_a_handful_of_times():
-    axes = {"layers.0.material": SILICONES, "estimate.frequency_hz": {"start": 50.0, "stop": 250.0, "num": 20_000}}
-    sweep = from_file({"base": "encapsulating", "sweep": axes}, Path(), "test")
-    blocks = list(estimate_table.evaluate(sweep, sweep.count))
-    assert sum(len(block.known) for block in blocks) == 100_000
-    assert not any(isinstance(entry, UnitcadError) for block in blocks for entry in block.known)
-    assert len({id(entry) for block in blocks for entry in block.known}) == 1
+def test_a_table_that_was_interrupted_is_taken_up_where_it_stopped(tmp_path):
+    sweep, at = _sweep("zip"), []
+
+    def watch(summary, outcome):
+        at.append(outcome and outcome.index)
+        if at == [0, 1]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        estimate_table.write_estimates(sweep, tmp_path / "o", BatchOptions(("estimate",)), watch)
+    summary = estimate_table.write_estimates(sweep, tmp_path / "o", BatchOptions(("estimate",)), watch)
+    assert at == [0, 1, *range(sweep.count), None]
+    assert (summary.resumed, summary.ok) == (2, sweep.count)
+    _rows(sweep, tmp_path / "whole")
+    tables = [(tmp_path / folder / "batch.json").read_bytes() for folder in ("o", "whole")]
+    assert tables[0] == tables[1]

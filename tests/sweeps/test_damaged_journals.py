@@ -10,10 +10,10 @@ from msgspec import to_builtins
 from msgspec.structs import replace
 
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.plan import code_version
 from unitcad.sweeps.journal import JOURNAL, BatchHead, Journal, JournalEntry
 
 HEAD = BatchHead(batch="0123456789abcdef", name="rings")
-CODE = "0.1.0+abc"
 VARIANTS = 12
 
 
@@ -25,7 +25,7 @@ def _entry(index, tries=0):
 @pytest.fixture
 def whole(tmp_path):
     """A journal of VARIANTS variants, some written twice, two equal to an earlier one."""
-    journal = Journal(tmp_path / "whole", HEAD, CODE)
+    journal = Journal(tmp_path / "whole", HEAD)
     for index in range(VARIANTS):
         journal.add(
             JournalEntry(index=index, same_as=index - 3, values={"a": -index}) if index in (5, 9) else _entry(index)
@@ -47,13 +47,13 @@ def _open(folder, content):
     """The entries of a journal of that content, opened twice; how many lines were left out."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / JOURNAL).write_bytes(content)
-    journal = Journal(folder, HEAD, CODE)
+    journal = Journal(folder, HEAD)
     try:
         found, damaged = list(journal.entries()), journal.damaged
         journal.add(_entry(VARIANTS))
     finally:
         journal.close()
-    again = Journal(folder, HEAD, CODE)
+    again = Journal(folder, HEAD)
     seen = list(again.entries()), again.damaged
     again.close()
     assert seen == ([*found, _entry(VARIANTS)], 0)
@@ -188,7 +188,10 @@ def test_a_line_that_we_did_not_write_is_left_out(kind, old, whole, tmp_path):
     if old:
         lines = [
             json.dumps(line).encode() + b"\n"
-            for line in ({"code": CODE, **to_builtins(HEAD)}, *(to_builtins(_entry(index)) for index in range(3)))
+            for line in (
+                {"code": code_version(), **to_builtins(HEAD)},
+                *(to_builtins(_entry(index)) for index in range(3)),
+            )
         ]
     start = time.monotonic()
     found, damaged = _open(tmp_path / "out", b"".join([*lines, json.dumps(FORGED[kind]).encode() + b"\n"]))
@@ -198,7 +201,7 @@ def test_a_line_that_we_did_not_write_is_left_out(kind, old, whole, tmp_path):
 
 
 def test_lines_of_another_batch_are_left_out(whole, tmp_path):
-    other = Journal(tmp_path / "other", replace(HEAD, batch="f" * 16), CODE)
+    other = Journal(tmp_path / "other", replace(HEAD, batch="f" * 16))
     other.add(_entry(2, 7))
     other.close()
     foreign = (tmp_path / "other" / JOURNAL).read_bytes().splitlines(keepends=True)[1]
@@ -220,5 +223,5 @@ def test_what_is_not_a_file_is_refused(kind, whole, tmp_path):
         case "link":
             (out / JOURNAL).symlink_to(tmp_path / "elsewhere")
     with pytest.raises(UnitcadError, match=JOURNAL):
-        Journal(out, HEAD, CODE)
+        Journal(out, HEAD)
     assert (tmp_path / "elsewhere").read_bytes() == whole

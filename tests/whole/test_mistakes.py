@@ -20,7 +20,6 @@ COMMANDS = {
     "build unit.toml --set diameter_mm 14": "--set = 'diameter_mm': needs the form path=value in one word, such as "
     "layers.0.wall_mm=1.0",
     "build unit.toml --formats stl step": "SPEC = 'step': is a format; several take commas: --formats stl,step",
-    "check --diff a.stl": "--diff: requires 2 arguments; see unitcad check --help",
     "init new.txt": "NAME = 'new.txt': is the name of a TOML file; nearest accepted: 'new.toml'",
     "build unit.toml --format stl": "--format: unknown option; closest: --formats",
     "build encapsulatng": "SPEC = 'encapsulatng': unknown name; closest: encapsulating, single-encapsulating; "
@@ -71,7 +70,6 @@ COMMANDS = {
     "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
     "check parts.csv": "FILE = 'parts.csv': no such file; closest: part.csv",
     "check 'none*.stl'": "FILE = 'none*.stl': no file matches",
-    "check --diff a.stl b.stl": "--diff = 'a.stl': no such file",
     "check part.csv --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
     "check a.stl --printer ender": "--printer = 'ender': unknown name; closest: ender-3; nearest accepted: 'ender-3'",
     "check part.csv --report sarif": "--report = 'sarif': must be FORMAT=FILE; nearest accepted: 'sarif=report.sarif'",

@@ -8,13 +8,15 @@ from unitcad.kernels.mesh import arrays, realise
 from unitcad.shape import cut, cylinder
 from unitcad.validation.load import every_template
 
-PAIR = ["--set", "layout.columns=2", "--set", "layout.rows=1", "--set", "sheet.strap_slot_mm=[3,8]"]
-ALL_FORMATS = {"encapsulating": [], "forearm-patch": PAIR, "forearm-pockets": PAIR}
+SMALL = "layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.cavities=[1,1]"
+PAIR = [word for change in SMALL for word in ("--set", change)]
+ALL = "stl,3mf,step,glb"
+BUILT = {"encapsulating": [ALL], "forearm-patch": ["stl,3mf,glb", *PAIR], "forearm-pockets": [ALL, *PAIR]}
 
 
-@pytest.mark.parametrize("template", ALL_FORMATS)
+@pytest.mark.parametrize("template", BUILT)
 def test_a_result_of_all_formats_passes_check_and_its_manifest(template, tmp_path):
-    passes(template, tmp_path, "stl,3mf,step,glb", *ALL_FORMATS[template])
+    passes(template, tmp_path, *BUILT[template])
 
 
 @pytest.mark.long

@@ -117,11 +117,10 @@ class Arrayed(Compound):
         names: Sequence[str],
         sets: Sequence[str],
         hertz: Sequence[float],
-        masses: bool,
         details: bool,
         as_json: bool,
     ) -> None:
-        estimate_arrays(names, sets, hertz, masses, details, as_json)
+        estimate_arrays(names, sets, hertz, details, as_json)
 
     def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
         return array_summary(self.of, folder, manifest, given)

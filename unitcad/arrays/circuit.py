@@ -31,7 +31,7 @@ from unitcad.errors import Missing, Refusal, missing_extra
 from unitcad.export.chart import coord
 from unitcad.geometry.segments import Point, to_box, to_segment
 from unitcad.shape import Common, Extrude, Profile, cylinder, moved
-from unitcad.shape.profile import Vertex, arc_centre, arc_middle, sides
+from unitcad.shape.profile import Vertex, arc_centre, sides
 from unitcad.shape.tree import Body
 from unitcad.spec import motor_of
 from unitcad.text import number
@@ -488,61 +488,6 @@ def _fixed_dates(ezdxf: Any) -> Iterator[None]:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-_VERSION = 20221018
-_CORNER_MM = 20.0
-_LAYERS = (
-    (0, "F.Cu", "signal"),
-    (31, "B.Cu", "signal"),
-    (36, "B.SilkS", 'user "B.Silkscreen"'),
-    (37, "F.SilkS", 'user "F.Silkscreen"'),
-    (38, "B.Mask", "user"),
-    (39, "F.Mask", "user"),
-    (40, "Dwgs.User", 'user "User.Drawings"'),
-    (44, "Edge.Cuts", "user"),
-    (45, "Margin", "user"),
-)
-
-
-def kicad_board(laid: Wiring, outline: Profile) -> bytes:
-    """Return a .kicad_pcb file."""
-    x0, _, _, y1 = outline.bounds
-
-    def at(x: float, y: float) -> str:
-        return f"{coord(x - x0 + _CORNER_MM, 6)} {coord(y1 - y + _CORNER_MM, 6)}"
-
-    rows = [
-        f"(kicad_pcb (version {_VERSION}) (generator unitcad)",
-        f"  (general (thickness {coord(laid.thickness, 6)}))",
-        f'  (paper "{_paper(outline)}")',
-        "  (layers",
-        *(f'    ({number} "{name}" {kind})' for number, name, kind in _LAYERS),
-        "  )",
-        "  (setup (pad_to_mask_clearance 0))",
-        '  (net 0 "")',
-    ]
-    stroke = "(stroke (width 0.05) (type default))"
-    for start, end in sides(outline.vertices):
-        middle = f"(mid {at(*arc_middle(start, end))}) " if start[2] else ""
-        kind = "gr_arc" if start[2] else "gr_line"
-        rows.append(f'  ({kind} (start {at(*start[:2])}) {middle}(end {at(*end[:2])}) {stroke} (layer "Edge.Cuts"))')
-    for pad in laid.pads:
-        centre, rim = at(pad.x, pad.y), at(pad.x + pad.radius, pad.y)
-        rows.append(f'  (gr_circle (center {centre}) (end {rim}) {stroke} (fill none) (layer "Dwgs.User"))')
-        rows.append(
-            f'  (gr_text "{pad.name}" (at {centre}) (layer "Dwgs.User") '
-            "(effects (font (size 1.5 1.5) (thickness 0.15))))"
-        )
-    return "\n".join([*rows, ")", ""]).encode()
-
-
-def _paper(outline: Profile) -> str:
-    """Return the smallest page around the outline and its margins."""
-    x0, y0, x1, y1 = outline.bounds
-    wide, high = x1 - x0 + 2 * _CORNER_MM, y1 - y0 + 2 * _CORNER_MM
-    sizes = (("A4", 297, 210), ("A3", 420, 297), ("A2", 594, 420), ("A1", 841, 594))
-    return next((name for name, across, down in sizes if wide <= across and high <= down), "A0")
-
-
 def pad_table(array: Array, laid: Wiring) -> bytes:
     """Return a CSV file: a row for each motor's pad, in mm as in the array's frame, and one for the end of the tail.
 
@@ -581,7 +526,6 @@ def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:
     drawn = outline(array, laid)
     files = {
         "circuit.svg": circuit_svg(laid, drawn).encode(),
-        "circuit.kicad_pcb": kicad_board(laid, drawn),
         "circuit-pads.csv": pad_table(array, laid),
     }
     lacking: dict[str, str] = {}

@@ -60,7 +60,7 @@ _HOW = "root of the sum of squares, or sum in phase"
 
 
 def estimate_arrays(
-    names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], masses: bool, details: bool, as_json: bool
+    names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], details: bool, as_json: bool
 ) -> None:
     """Print the crosstalk of arrays and, of several, each over the first. `hertz`: one frequency, or a band."""
     for name in names:
@@ -70,7 +70,7 @@ def estimate_arrays(
     arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]
     band = hertz if len(hertz) > 1 else () if hertz else BAND_HZ
     with progress("crosstalk") as stage:
-        every = [crosstalk(array, band, masses, say=stage) for array in arrays]
+        every = [crosstalk(array, band, say=stage) for array in arrays]
     compared = ratios(every)
     if as_json:
         print_json(every[0] if len(every) == 1 else {"arrays": every, "ratios": compared})

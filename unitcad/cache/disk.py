@@ -154,15 +154,6 @@ class DiskStore:
                 self._write(Path(name), Path(target).read_bytes(), shared=True)
                 self._verified[sha256] = _signature(name)
 
-    def peek(self, key: str) -> Any:
-        """Return the data under `key`, or None."""
-        return self._read("data", key, lambda data: True)
-
-    def forget(self, key: str) -> None:
-        """Remove the entry of a key."""
-        for kind in ("data", "file"):
-            remove(self._path(kind, key))
-
     @contextlib.contextmanager
     def _entry(self, kind: str, key: str, intact: Intact) -> Iterator[Entry]:
         path = self._path(kind, key)

@@ -257,13 +257,6 @@ def check(
         str | None,
         typer.Option(metavar="DIR", help="Folder for pictures of findings and coloured 3MF files. Default: none."),
     ] = None,
-    diff: Annotated[
-        tuple[str, str] | None,
-        typer.Option(
-            metavar="OLD NEW",
-            help="Compare two versions of a file or a folder. Only new findings fail. Default: no comparison.",
-        ),
-    ] = None,
     config: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Settings: a TOML file with a [check] table. Default: the nearest one."),
@@ -321,14 +314,6 @@ def check(
     for name in files or ():
         if name.endswith(".toml") and Path(name).is_file():
             expect_none_but("", read_toml(Path(name)), name, "FILE")
-    if diff is not None:
-        if files or manifest is not None or base is not None:
-            raise UnitcadError("--diff compares its two names alone: leave out other files, --manifest and --baseline")
-        from unitcad.cli import check_diff  # with trimesh and SciPy, which no other check needs
-
-        said, code = check_diff.run(*diff, options, level, output_format, pictures)
-        _write(said, plain=output_format == "text")
-        raise typer.Exit(code)
     if not files and manifest is None:
         raise UnitcadError(
             "FILE...: is required: mesh files, folders or globs, or --manifest; see unitcad check --help"

@@ -313,9 +313,6 @@ def estimate(
             metavar="HZ|FROM:TO:STEP", help="One frequency, or a table over frequencies. Default: the motor's."
         ),
     ] = "",
-    masses: Annotated[
-        bool, typer.Option("--masses", help="Include the units' masses in an array's crosstalk.")
-    ] = False,
     fit: Fit = None,
     sets: Sets = None,
     details: Annotated[
@@ -341,9 +338,7 @@ def estimate(
     if kinds:
         if model:
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
-        return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), hertz, masses, details, as_json)
-    if masses:
-        raise Refusal("--masses", None, "is for arrays")
+        return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), hertz, details, as_json)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)

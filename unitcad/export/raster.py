@@ -315,13 +315,19 @@ def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple
     return table.astype(np.uint8).view(np.uint32)[shade, 0].view(np.uint8).reshape(height, width, 4), depth, shown
 
 
-def finish(layers: Sequence[Layer], view: Camera, names: Sequence[Name] = (), labels: Sequence[str] = ()) -> bytes:
+def finish(
+    layers: Sequence[Layer],
+    view: Camera,
+    names: Sequence[Name] = (),
+    labels: Sequence[str] = (),
+    wires: bool = False,
+) -> bytes:
     """Return the picture of layers drawn for one view as a PNG, without the empty rows above and below.
 
     Names, and the `labels` of layers, are clear of the drawing and of each other if there is room, each with a line to
     the named part.
     """
-    colour, _, shown = compose(layers, view)
+    colour, _, shown = compose(layers, view, wires)
     shown = shown[::SHARPER, ::SHARPER]
     picture = Image.fromarray(colour).convert("RGB")
     names = [*name_layers(layers, labels, shown, view), *names]

@@ -57,7 +57,6 @@ class Compound(Subject):
         names: Sequence[str],
         sets: Sequence[str],
         hertz: Sequence[float],
-        masses: bool,
         details: bool,
         as_json: bool,
     ) -> None:

@@ -40,7 +40,7 @@ FILE_TYPES = {
     ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
     ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
     ".stl": "model/stl", ".3mf": "model/3mf", ".step": "model/step", ".glb": "model/gltf-binary",
-    ".dxf": "image/vnd.dxf", ".kicad_pcb": "text/plain; charset=utf-8", ".gcode": "text/plain; charset=utf-8",
+    ".dxf": "image/vnd.dxf", ".gcode": "text/plain; charset=utf-8",
 }  # fmt: skip
 _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 'self'"
 """A result's page runs apart: it can reach neither the token nor this server."""

@@ -3,122 +3,65 @@
 from __future__ import annotations
 
 import os
-import shutil
-import time
-import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from unitcad import text
 from unitcad.arguments import check_number, path, texts
-from unitcad.cache import DiskStore, MemoryStore, MissingContent, SharedStore, default_root
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
-from unitcad.pipeline.make import Progress, Subject
-from unitcad.pipeline.plan import body_key, check_outputs, groups
+from unitcad.pipeline.plan import check_outputs
 from unitcad.pipeline.subjects import subject
-from unitcad.pipeline.write import ADDRESS, STORE
 from unitcad.report import write_report
 from unitcad.report.read_results import read_batch
 from unitcad.spec.raw import OUTPUTS, Format
-from unitcad.sweeps.destination import note_store, resolve_address
 from unitcad.sweeps.estimate_table import write_estimates
 from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
-from unitcad.sweeps.journal import Journal, JournalEntry, Preview, RefusedVariant, Summary
-from unitcad.sweeps.result_folders import folders_wanted, lost, make_folders
-from unitcad.sweeps.results import TABLES, columns_of, tables_of, write_results
-from unitcad.sweeps.run import NEXT, Watch, batch_head, count_entry, count_variants, run, trim
-from unitcad.sweeps.shards import BatchOptions, ShardRecord, read_shards, shard_folders, shard_of, store_of
+from unitcad.sweeps.journal import Preview, RefusedVariant, Summary
+from unitcad.sweeps.result_folders import BatchOptions
+from unitcad.sweeps.results import TABLES
+from unitcad.sweeps.run import Watch, count_variants, run, trim
 from unitcad.sweeps.sweep import Sweep, load_sweep
-from unitcad.text import some, toml
+from unitcad.text import toml
 from unitcad.validation import Changes
 from unitcad.validation.plain_data import changes_of
 
 LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
-DRAWN, BUILT = 24, 2
-"""Geometries whose parts are counted, and geometries that are made to measure their bytes."""
 MOST_REFUSED = 20
-ROW_BYTES = {"csv": 100, "json": 300, "parquet": 8}
-"""Of a variant in a table, about: as in tables of estimates with two swept values."""
 
 
 def preview(sweep: Sweep, options: BatchOptions) -> Preview:
-    """Count variants, distinct geometries and parts, files and megabytes: of a shard its own, if one is asked for.
+    """Count variants and distinct geometries.
 
-    Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError
-    if all are.
+    Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError if all are.
     """
     only = check_outputs(options.only)
-    whole = count_variants(sweep, options.limit)
-    indices = options.shard.indices(whole) if options.shard else range(whole)
-    count = len(indices)
+    count = count_variants(sweep, options.limit)
     looked = min(count, LOOKED_AT)
-    geometries: dict[str, Subject] = {}
+    geometries: set[str] = set()
     refused: list[RefusedVariant] = []
-    accepted = 0
-    for index in indices[:looked]:
+    for index in range(looked):
         try:
             variant = subject(sweep.spec(index))
         except UnitcadError as error:
             refused.append(RefusedVariant(index, sweep.faults(index, error)))
             continue
-        accepted += 1
-        geometries.setdefault(variant.key(only, options.check), variant)
-    if refused and not accepted:
+        geometries.add(variant.key(only, options.check))
+    if refused and not geometries:
         raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
     share = count / max(looked, 1)
-    tables = tables_of(count, options.tables)
-    spread = list(geometries.values())
-    drawn = spread[:: max(1, len(spread) // DRAWN)][:DRAWN]
-    per_drawn = _distinct_parts(drawn, only)
-    number, variants = len(geometries) * share, accepted * share
-    if only == ("estimate",) and not sweep.of_compounds:
-        files, stored, linked = 0.0, 0.0, 0.0
-    else:
-        weighed = [_weight(variant, only) for variant in drawn[:: max(1, len(drawn) // BUILT)][:BUILT]]
-        shared, own, packed, contents, each = (sum(w[i] for w in weighed) / max(1, len(weighed)) for i in range(5))
-        linked = (shared + own) * variants
-        if folders_wanted(options, count):
-            files, stored = each * variants, shared * number + own * variants
-        else:  # a store's: the shared contents of a geometry, and packs of its records
-            files, stored = (contents + 1) * number + variants / NEXT, shared * number + packed * variants
-    rows = sum(ROW_BYTES[name] for name in tables) * count
     return Preview(
         variants=count,
-        geometries=round(number),
-        parts=round(per_drawn * number / max(1, len(drawn))),
-        exact=looked == count and len(drawn) == len(geometries),
-        files=round(files) + len(tables),
-        stored_mb=round((stored + rows) / 1e6, 3),
-        linked_mb=round((linked + rows) / 1e6, 3),
+        geometries=round(len(geometries) * share),
+        exact=looked == count,
         refused_count=round(len(refused) * share),
         refused=refused[:MOST_REFUSED],
-        warnings=insensitive_warnings(swept_estimate(sweep, whole)) if "estimate" in only else [],
+        warnings=insensitive_warnings(swept_estimate(sweep, count)) if "estimate" in only else [],
     )
-
-
-def _distinct_parts(variants: list[Subject], only: tuple[str, ...]) -> int:
-    """Count the different bodies of these variants."""
-    keys = set()
-    for variant in variants:
-        moulds = variant.moulds
-        for group in groups(moulds, variant.outputs(only)):
-            keys |= {body_key(moulds, body, "record") for body in group.bodies}
-    return len(keys)
-
-
-def _weight(variant: Subject, only: tuple[str, ...]) -> tuple[int, int, int, int, int]:
-    """Return (bytes shared, its own, its own deflated, contents, files) of a variant made in memory, without checks."""
-    store = MemoryStore()
-    product = variant.make(only, False, store, Progress())
-    shared = {sha: len(store.content(sha)) for sha in product.shared.values()}
-    own = sum(map(len, product.own.values()))
-    packed = len(zlib.compress(b"".join(product.own.values())))
-    return sum(shared.values()), own, packed, len(shared), len(product.shared) + len(product.own) + 1
 
 
 @dataclass(frozen=True, repr=False)
@@ -167,20 +110,10 @@ def make(
 
     Raises Refusal or UnitcadError if nothing can be run.
     """
-    if options.folders is False and workers.scheduler is not None and options.store is None and not options.shard:
-        why = "results of a cluster go to folders here, or with --store to a store: name one, or leave it out"
-        raise WrongArgument("folders", False, why)
     if options.folders and options.only == ("estimate",) and not sweep.of_compounds:
         raise WrongArgument("folders", True, "estimates only are one table: leave it out")
-    if options.shard:
-        if options.only == ("estimate",):
-            raise WrongArgument("shard", str(options.shard), "estimates only are one table: leave it out")
-        whole = batch_head(sweep, check_outputs(options.only), replace(options, shard=None))
-        variants = count_variants(sweep, options.limit)
-        store = store_of(folder, options.shard, whole.batch, variants, options.store)
-        folder, options = folder / options.shard.folder, replace(options, store=store)
     if options.only == ("estimate",) and not sweep.of_compounds:
-        return write_estimates(sweep, folder, options)
+        return write_estimates(sweep, folder, options, watch)
     with workers.executor(options.timeout) as (executor, number):
         remote = workers.scheduler is not None
         summary = run(sweep, folder, options, executor, workers=number, remote=remote, watch=watch)
@@ -205,7 +138,6 @@ def batch(
     store: str | os.PathLike[str] | None = None,
     folders: bool | None = None,
     tables: Sequence[str] | str | None = None,
-    shard: str | None = None,
 ) -> BatchResult:
     """Make every variant of a sweep, each distinct part once. The same call again resumes an interrupted one.
 
@@ -233,8 +165,6 @@ def batch(
         Write a folder for each variant. Default: below 1,000 variants.
     tables : str or sequence of str, optional
         Any of csv, json, parquet. Default: csv and json; parquet from 10,000 variants.
-    shard : str, optional
-        One part of the sweep, such as "3/16".
 
     Returns
     -------
@@ -276,12 +206,11 @@ def batch(
         store=stored,
         folders=folders_for(report, folders, chosen_outputs),
         tables=check_tables(None if tables is None else texts("tables", tables), report),
-        shard=None if shard is None else shard_of(shard),
     )
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
         write_report(folder)
-    return BatchResult(folder / options.shard.folder if options.shard else folder, summary)
+    return BatchResult(folder, summary)
 
 
 def folders_for(report: bool, asked: bool | None, only: Sequence[str] = OUTPUTS) -> bool | None:
@@ -295,106 +224,3 @@ def check_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str
         if name not in TABLES:
             raise unknown_name("tables", name, TABLES, WrongArgument)
     return None if names is None and not report else (*(names or ("csv",)), *(("json",) if report else ()))
-
-
-def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
-    """Put the shards in `folders` together as one batch in `out`: its journal, its tables and, if wanted, its folders.
-
-    The result is that of the same sweep without shards. Of `options` those of folders, tables and cache count. Raises
-    UnitcadError if shards are missing, unfinished, or of different batches, or if their store has lost content; `out`
-    is then unchanged.
-    """
-    start = time.perf_counter()
-    shards = read_shards(folders)
-    first = shards[0][1]
-    addresses = {folder: resolve_address(folder, record.store) for folder, record in shards}
-    opened = {address: SharedStore(address) for address in set(addresses.values())}
-    stores = {folder: opened[address] for folder, address in addresses.items()}
-    wanted = folders_wanted(options, first.variants)
-    if len(opened) > 1 and not wanted:
-        raise UnitcadError(
-            f"the shards have their results in {len(opened)} stores, {some(sorted(opened))}, and a batch has one; "
-            "merge with --folders"
-        )
-    _expect_finished(shards, stores)
-    summary = Summary(first.variants)
-    noted_before = (out / ADDRESS).exists()
-    journal = Journal(out, first.head, first.code, beside={STORE, *(f.name for f in shard_folders(out))})
-    fresh: list[Path] = []
-    try:
-        for folder, record in shards:
-            with _open(folder, record) as part:
-                for index in record.indices:
-                    entry = part.own(index)
-                    if entry is not None and journal.own(index) != entry:
-                        journal.add(entry)
-        for entry in journal.entries():
-            count_entry(summary, entry.status, lambda entry=entry: entry)
-        if len(opened) == 1:
-            note_store(out, *opened)
-        if wanted:
-            cache = DiskStore(options.cache or default_root())
-            try:
-                for folder, record in shards:
-                    entries = filter(None, map(journal.entry, record.indices))
-                    make_folders(out, entries, stores[folder], cache, _maker(record), fresh.append)
-            finally:
-                cache.close()
-        found = swept_estimate(first.sweep, first.variants) if "estimate" in first.head.outputs else None
-        summary.warnings += insensitive_warnings(found)
-        write_results(
-            out, columns_of(first.sweep, journal), journal.entries, first.head, found, options.tables, first.variants
-        )
-    except UnitcadError:
-        for made in fresh:
-            shutil.rmtree(made, ignore_errors=True)
-        if not noted_before:
-            (out / ADDRESS).unlink(missing_ok=True)
-        journal.abandon()
-        raise
-    finally:
-        journal.close()
-    summary.seconds = round(time.perf_counter() - start, 3)
-    return summary
-
-
-def _open(folder: Path, record: ShardRecord) -> Journal:
-    return Journal(folder, record.shard_head, record.code, first=record.indices.start)
-
-
-def _maker(*records: ShardRecord) -> str:
-    numbers = [f"{record.number}/{record.of}" for record in records]
-    each = "each of " if len(numbers) > 1 else ""
-    return f"the sweep with {each}--shard {some(numbers)} and"
-
-
-def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping[Path, SharedStore]) -> None:
-    """Raise UnitcadError for a shard in which a variant is missing or a batch is running, or whose records are gone."""
-    packs: dict[str, dict[str, int]] = {}
-    gone: dict[int, tuple[JournalEntry, MissingContent]] = {}  # by shard: its first variant that is lost
-    for folder, record in shards:
-        store = stores[folder]
-        missing = list[int]()
-        needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and the end of its last one
-        with _open(folder, record) as part:
-            for index in record.indices:
-                entry = part.own(index)
-                if entry is None:
-                    missing.append(index)
-                elif place := entry.record:
-                    first, end = needed.get(place.pack, (entry, 0))
-                    needed[place.pack] = first, max(end, place.end)
-        if missing:
-            raise UnitcadError(
-                f"{folder}: {len(missing)} of {len(record.indices)} variants are not made yet, the first is "
-                f"variant {missing[0]}; the shard's own command resumes it"
-            )
-        if store.address not in packs:
-            store.expect()
-            packs[store.address] = store.sizes("packs")
-        for pack, (first, end) in needed.items():
-            if packs[store.address].get(pack, 0) < end:
-                why = MissingContent(f"pack {pack[:12]} is not in {store.address}, or cut there")
-                gone.setdefault(record.number, (first, why))
-    if gone:
-        raise lost(*next(iter(gone.values())), _maker(*(record for _, record in shards if record.number in gone)))

@@ -29,17 +29,16 @@ from unitcad.cli.shared_options import (
     outputs,
     overrides,
 )
-from unitcad.errors import Refusal, WrongArgument
+from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.batch_call import check_tables, folders_for, make, merge, preview
-from unitcad.sweeps.executors import Certificates, Workers
+from unitcad.sweeps.batch_call import check_tables, folders_for, make, preview
+from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.journal import Preview, Summary
-from unitcad.sweeps.result_folders import export_variants
+from unitcad.sweeps.result_folders import BatchOptions, export_variants
 from unitcad.sweeps.run import Watch
-from unitcad.sweeps.shards import BatchOptions, shard_folders, shard_of
 from unitcad.sweeps.task import VariantOutcome
 
 
@@ -106,17 +105,10 @@ PAGE_UP_TO = 100
 
 
 def batch(
-    ctx: typer.Context,
-    sweep: Annotated[
-        str,
-        typer.Argument(
-            metavar="SWEEP", help="Sweep file, or name of a shipped one (unitcad list sweeps); merge joins shards."
-        ),
+    named: Annotated[
+        list[str],
+        typer.Argument(metavar="SWEEP", help="Sweep file, or name of a shipped one (unitcad list sweeps)."),
     ],
-    shards: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[SHARD]...", help="Folders of shards to merge, or their common parent."),
-    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", metavar="DIR", help="Folder of the batch. Default: out/NAME-OF-THE-SWEEP."),
@@ -130,19 +122,8 @@ def batch(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, such as tls://host:8786. Default: none.")
     ] = None,
-    tls_ca_file: Annotated[
-        Path | None,
-        typer.Option(metavar="PEM", help="Certificate authority for tls://. Default: Dask's configuration."),
-    ] = None,
-    tls_cert: Annotated[
-        Path | None,
-        typer.Option(metavar="PEM", help="Client certificate for tls://. Default: Dask's configuration."),
-    ] = None,
-    tls_key: Annotated[
-        Path | None, typer.Option(metavar="PEM", help="Client key for tls://. Default: Dask's configuration.")
-    ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the number of variants, parts and files; make nothing.")
+        bool, typer.Option("--dry-run", help="Print the number of variants and geometries; make nothing.")
     ] = False,
     verify: Annotated[
         bool,
@@ -178,10 +159,6 @@ def batch(
         str | None,
         typer.Option(metavar="NAMES", help="Tables: csv,json,parquet. Default: csv,json below 10,000 variants."),
     ] = None,
-    shard: Annotated[
-        str | None,
-        typer.Option(metavar="K/N", help="Make part K of N of the sweep; batch merge joins the parts. Default: all."),
-    ] = None,
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
@@ -201,24 +178,18 @@ def batch(
 ) -> None:
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
 
-    named = names_in(table) if table is not None else None
-    if sweep == "merge":
-        _confirm_merges(ctx)
-        paged = bool(page)
-        options = BatchOptions(folders=folders_for(paged, folders), cache=cache, tables=check_tables(named, paged))
-        _merge(shards or [], out, options, paged, as_json)
-        return
-    if shards:
-        expect_commas("SWEEP", map(str, shards))
-        raise Refusal("SWEEP", str(shards[0]), "a batch takes one sweep; run a second batch for this one")
+    sweep, *others = named
+    expect_commas("SWEEP", others)
+    if others:
+        raise Refusal("SWEEP", others[0], "a batch takes one sweep; run a second batch for this one")
+    tables = names_in(table) if table is not None else None
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
-    part = None if shard is None else shard_of(shard)
-    usual = only is None and not (folders is False or table or store or part or scheduler)
+    usual = only is None and not (folders is False or table or store or scheduler)
     page = usual and wanted.count <= PAGE_UP_TO if page is None else page
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
-        folders_for(page, folders, chosen), check_tables(named, page), part)  # fmt: skip
+        folders_for(page, folders, chosen), check_tables(tables, page))  # fmt: skip
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
@@ -228,55 +199,19 @@ def batch(
     if chosen == ("estimate",) and store is not None:
         raise Refusal("--store", store, "estimates only are one table and no files: leave it out")
     folder = out or Path("out") / wanted.slug
-    made = folder / options.shard.folder if options.shard else folder
-    workers = Workers(jobs, scheduler, Certificates(tls_ca_file, tls_cert, tls_key))
+    workers = Workers(jobs, scheduler)
     try:
         with watching(json_lines) as watch:
             summary = make(wanted, folder, options, workers, watch)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: finished variants stay in {made}; the same command resumes", err=True)
+        typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
         sys.exit(130)
-    _write_page(made, page)
+    _write_page(folder, page)
     if as_json:
-        print_json({"folder": str(made), **to_builtins(summary)})
+        print_json({"folder": str(folder), **to_builtins(summary)})
     elif not json_lines:
-        _print_summary(summary, made)
+        _print_summary(summary, folder)
     if summary.failed or summary.stopped:
-        sys.exit(1)
-
-
-_OF_MERGE = ("sweep", "shards", "out", "folders", "cache", "table", "page", "as_json")
-"""Parameters of the command that a merge reads; the others are the shards' own."""
-
-
-def _confirm_merges(ctx: typer.Context) -> None:
-    """Raise WrongArgument for an option that a merge would not read."""
-
-    for parameter in ctx.command.params:
-        source = ctx.get_parameter_source(parameter.name or "")
-        if parameter.name not in _OF_MERGE and source is not None and source.name == "COMMANDLINE":
-            taken = "-o, --folders, --no-folders, --cache, --table, --report and --json"
-            raise WrongArgument(
-                max(parameter.opts, key=len).lstrip("-"), None, f"goes with a sweep; merge takes {taken}"
-            )
-
-
-def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: bool, as_json: bool) -> None:
-    """Join shards as one batch: in their parent folder, or in `out`."""
-
-    folders = [each for path in named for each in (shard_folders(path) or [path])]
-    whole = out or (folders[0].parent if folders else Path())
-    try:
-        summary = merge(whole, folders, options)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted: shards and {whole} are unchanged; the same command resumes", err=True)
-        sys.exit(130)
-    _write_page(whole, page)
-    if as_json:
-        print_json({"folder": str(whole), **to_builtins(summary)})
-    else:
-        _print_summary(summary, whole, joined=True)
-    if summary.failed:
         sys.exit(1)
 
 
@@ -289,7 +224,7 @@ def _write_page(folder: Path, asked: bool) -> None:
             write_report(folder, warn)
 
 
-def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> None:
+def _print_summary(summary: Summary, folder: Path) -> None:
 
     for warning in summary.warnings:
         warn(f"warning: {warning}")
@@ -302,10 +237,10 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
     before = f" ({summary.resumed} from before)" if summary.resumed else ""
     left = summary.variants - summary.done
     parts = [
-        f"{summary.ok} of {counted(summary.variants, 'variant')} {'joined' if joined else 'made'}{before}",
+        f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
         f"{summary.failed} failed",
         *([f"{left} not tried"] if left else []),
-        *([] if joined else [_parts(summary)]),
+        _parts(summary),
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))
@@ -324,9 +259,6 @@ def _print_preview(size: Preview) -> None:
 
     about = "" if size.exact else "about "
     typer.echo(f"{counted(size.variants, 'variant')} of {about}{counted(size.geometries, 'geometry', 'geometries')}")
-    typer.echo(f"{about}{counted(size.parts, 'distinct part')}")
-    stored = f"{size.stored_mb:.1f} MB stored, {size.linked_mb:.1f} MB with every link counted"
-    typer.echo(f"about {counted(size.files, 'file')}, {stored}")
     for warning in size.warnings:
         warn(f"warning: {warning}")
     for refused in size.refused:

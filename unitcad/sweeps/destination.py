@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
@@ -12,14 +11,12 @@ from pathlib import Path
 from typing import Protocol
 
 from unitcad import files
-from unitcad.cache import Bundle, DiskStore, MissingContent, SharedStore, absolute, digest
+from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute, digest
 from unitcad.errors import UnitcadError
-from unitcad.files import write_new
-from unitcad.pipeline.plan import code_version
-from unitcad.pipeline.write import ADDRESS, STORE, replacing, sync, whole
+from unitcad.pipeline.write import ADDRESS, whole
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.journal import JournalEntry
-from unitcad.sweeps.record_packs import export, intact, pack_specs
+from unitcad.sweeps.record_packs import export, intact
 from unitcad.sweeps.task import Task, VariantOutcome
 
 
@@ -38,7 +35,7 @@ class Destination(Protocol):
         """Return a task with the destination of its results."""
         ...
 
-    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+    def take(self, outcome: VariantOutcome) -> VariantOutcome:
         """Return an outcome whose files are in place. Raises OSError."""
         ...
 
@@ -72,7 +69,7 @@ class Folders:
     def task(self, task: Task) -> Task:
         return replace(task, out=self.out.absolute(), cache=self.store.root.absolute())
 
-    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+    def take(self, outcome: VariantOutcome) -> VariantOutcome:
         return outcome
 
 
@@ -105,12 +102,10 @@ class InStore:
         return entry.manifest if entry.record else ""
 
     def task(self, task: Task) -> Task:
-        specs = pack_specs(self.store, [job.spec for job in task.jobs])
-        jobs = tuple(replace(job, spec="") for job in task.jobs)
         cache = self.cache.root.absolute() if self.cache else None
-        return replace(task, jobs=jobs, specs=specs, store=self.store.address, cache=cache)
+        return replace(task, store=self.store.address, cache=cache)
 
-    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+    def take(self, outcome: VariantOutcome) -> VariantOutcome:
         place = outcome.record
         if self.folder and place is not None and place.pack != self._seen:
             if (self.store.size(place.pack, "packs") or 0) < place.end:
@@ -127,65 +122,13 @@ def is_made(entry: JournalEntry) -> bool:
     return entry.status in (tasks.OK, tasks.BROKEN)
 
 
-class Receiver(Folders):
-    """Folders of the results of remote workers: each content once, and the reusable files of each geometry."""
-
-    def task(self, task: Task) -> Task:
-        return replace(task, known=self.known(task.geometry))
-
-    def known(self, geometry: str) -> Bundle | None:
-        """Return the bundle of a geometry, or None if any of it is missing."""
-        bundle = self.store.peek(_key(geometry))
-        if bundle is None or not all(map(self.store.has, bundle["files"].values())):
-            return None
-        return Bundle(bundle["data"], bundle["files"], bundle["sizes"])
-
-    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
-        """Put a variant's files into its folder; return the outcome without them. Raises OSError."""
-        if outcome.product is None:
-            return outcome
-        try:
-            for content in outcome.contents.values():
-                self.store.keep(content)
-            if outcome.bundle and all(map(self.store.has, outcome.bundle.files.values())):
-                self.store.forget(_key(geometry))
-                with self.store.entry(_key(geometry)) as entry:
-                    entry.data = vars(outcome.bundle)
-            folder = self.out / outcome.folder
-            timings = {"code": code_version(), "seconds": {"all": round(outcome.seconds, 4)}}
-            with replacing(folder) as fresh:
-                outcome.product.place(fresh, self.store)
-                write_new(fresh / "timings.json", (json.dumps(timings) + "\n").encode())
-            sync([folder])
-        except OSError:
-            raise
-        except Exception as error:
-            return tasks.failure(outcome.index, error)
-        return replace(outcome, product=None, contents={}, bundle=None)
-
-
-def _key(geometry: str) -> str:
-    return digest(f"remote {geometry}".encode())
-
-
 def note_store(out: Path, address: str) -> None:
-    """Note the store's place in a batch's folder. Raises OSError."""
-    files.write(out / ADDRESS, json.dumps({"store": note_address(out, address)}).encode() + b"\n")
-
-
-def note_address(out: Path, address: str) -> str:
-    """Return a store's address as a batch in `out` notes it: relative if near the batch, so that both can move."""
-    near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
-    return near.get(address, address)
-
-
-def resolve_address(out: Path, address: str) -> str:
-    """Return the address that a batch in `out` has noted (`note_address`)."""
-    return absolute(address if "://" in address else os.path.normpath(out / address))
+    """Note the store's address in a batch's folder. Raises OSError."""
+    files.write(out / ADDRESS, json.dumps({"store": address}).encode() + b"\n")
 
 
 def store_noted(out: Path) -> str | None:
     """Return the address of the store that a batch's folder notes, None if it notes none. Raises UnitcadError."""
     if not (out / ADDRESS).is_file():
         return None
-    return resolve_address(out, str(files.read_json(out / ADDRESS)["store"]))
+    return absolute(str(files.read_json(out / ADDRESS)["store"]))

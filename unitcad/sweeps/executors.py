@@ -10,52 +10,20 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from unitcad.errors import Refusal, UnitcadError, WrongArgument, missing_extra
-from unitcad.files import no_such_file
+from unitcad.errors import UnitcadError, WrongArgument, missing_extra
 from unitcad.workers import Pool, cores
 
 DASK_SECONDS = 6.0
 """Seconds that a scheduler may take to answer: with imports and start-up the command ends within ten."""
-ENCRYPTED = ("tls://", "wss://")
 
 
-@dataclass(frozen=True)
-class Certificates:
-    """Certificate files (PEM) for a TLS connection; Dask's configuration gives those that are None."""
-
-    ca: Path | None = None
-    cert: Path | None = None
-    key: Path | None = None
-
-    def given(self) -> dict[str, tuple[str, Path]]:
-        """Return the option and the path of each file that is given, by Dask's name."""
-        named = {
-            "tls_ca_file": ("--tls-ca-file", self.ca),
-            "tls_client_cert": ("--tls-cert", self.cert),
-            "tls_client_key": ("--tls-key", self.key),
-        }
-        return {name: (option, path) for name, (option, path) in named.items() if path is not None}
-
-
-FROM_DASK = Certificates()
-
-
-def check_certificates(certificates: Certificates, scheduler: str | None) -> None:
-    """Refuse certificates for a connection that uses none, and files that are not there. Raises Refusal."""
-    for option, path in certificates.given().values():
-        if scheduler is None or not scheduler.startswith(ENCRYPTED):
-            raise Refusal(option, str(path), "needs a --scheduler at tls://")
-        if not path.is_file():
-            raise Refusal(option, str(path), no_such_file(path))
-
-
-def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple[Executor, int]:
+def dask_executor(address: str) -> tuple[Executor, int]:
     """Connect to a Dask cluster; return its executor, and how many tasks it runs at once.
 
-    Raises UnitcadError without the extra, for certificates that can't be used, or if no scheduler answers in time.
+    Dask's configuration names the certificates. Raises UnitcadError without the extra, for certificates that can't be
+    used, or if no scheduler answers in time.
     """
     try:
         from distributed import Client
@@ -74,15 +42,12 @@ def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple
         raise UnitcadError(f"--scheduler {address}: not a scheduler's address ({error})") from None
 
     try:
-        security = Security(**{name: str(path) for name, (_, path) in certificates.given().items()})
+        security = Security()
         arguments = security.get_connection_args("client")
     except (OSError, ssl.SSLError, ValueError, TypeError) as error:
         raise UnitcadError(f"--scheduler {address}: the certificates can't be used: {error}") from None
-    if address.startswith(ENCRYPTED) and arguments.get("ssl_context") is None:
-        raise UnitcadError(
-            f"--scheduler {address}: needs --tls-ca-file, --tls-cert and --tls-key, or the same in Dask's "
-            "configuration (distributed.comm.tls)"
-        )
+    if scheme in ("tls", "wss") and arguments.get("ssl_context") is None:
+        raise UnitcadError(f"--scheduler {address}: needs certificates in Dask's configuration (distributed.comm.tls)")
 
     async def ask() -> Any:
         comm = await connect(address, timeout=DASK_SECONDS, **arguments)
@@ -142,7 +107,6 @@ class Workers:
 
     jobs: int | None = None
     scheduler: str | None = None
-    certificates: Certificates = FROM_DASK
 
     @contextlib.contextmanager
     def executor(self, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
@@ -150,11 +114,10 @@ class Workers:
 
         Raises Refusal or UnitcadError for an invalid combination, or a scheduler that does not answer.
         """
-        check_certificates(self.certificates, self.scheduler)
         if self.scheduler is not None:
             if self.jobs is not None:
                 raise WrongArgument("jobs", self.jobs, "the scheduler knows its workers; leave it out with --scheduler")
-            cluster, threads = dask_executor(self.scheduler, self.certificates)
+            cluster, threads = dask_executor(self.scheduler)
             try:
                 yield cluster, threads
             finally:

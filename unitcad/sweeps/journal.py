@@ -14,7 +14,7 @@ import json
 import os
 import zlib
 from array import array
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -104,23 +104,17 @@ class RefusedVariant(Struct, frozen=True):
 
 
 class Preview(Struct, frozen=True, kw_only=True):
-    """Size of a batch that is not made; `exact`: whether variants, geometries and parts are counts."""
+    """Size of a batch that is not made; `exact`: whether its geometries are counted."""
 
     variants: int
     geometries: int
-    parts: int
     exact: bool
-    files: int
-    stored_mb: float
-    linked_mb: float
     refused_count: int
     refused: list[RefusedVariant]
     warnings: list[str] = []
 
 
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
-SHARDS = "shard-*-of-*"
-"""Folders of shards below that of their batch."""
 NOT_THERE = -1
 FORMAT = 2
 """Version of the lines. A journal of version 1, which had no checksums, is replaced."""
@@ -131,20 +125,17 @@ LONGEST = 1 << 26
 class Journal:
     """The journal of one output folder, open and locked; `damaged` counts the skipped lines.
 
-    `first` is the least possible index; `beside` are names that the folder may already contain.
     Raises UnitcadError for a folder that isn't ours, that has another batch, or in which a batch is running.
     """
 
-    def __init__(
-        self, out: Path, head: BatchHead, code: str | None = None, *, first: int = 0, beside: Collection[str] = ()
-    ) -> None:
-        self.out, self._first = out, first
-        self.head = {"format": FORMAT, **to_builtins(head), "code": code or code_version()}
+    def __init__(self, out: Path, head: BatchHead) -> None:
+        self.out = out
+        self.head = {"format": FORMAT, **to_builtins(head), "code": code_version()}
         self._seed = zlib.crc32(_text(self.head))
         self._lines = array("q")
         self.damaged = 0
         self._begun = [path for path in (out / JOURNAL, out / LOCK, out) if not os.path.lexists(path)]
-        self._lock = _lock(out, head, beside)
+        self._lock = _lock(out, head)
         try:
             self._file = self._open(out / JOURNAL)
         except BaseException:
@@ -160,18 +151,17 @@ class Journal:
 
     def entry(self, index: int) -> JournalEntry | None:
         """Return the last entry of a variant; a variant equal to another one gets that one's entry."""
-        own = self.own(index)
+        own = self._own(index)
         if own is None or own.same_as is None:
             return own
-        other = self.own(own.same_as)
+        other = self._own(own.same_as)
         if other is None or other.same_as is not None:
             return None
         return structs.replace(other, index=index, values=own.values)
 
     def entries(self) -> Iterator[JournalEntry]:
         """Yield every variant's entry in the sweep's order, read one by one."""
-        indices = range(self._first, self._first + len(self._lines))
-        return (entry for index in indices if (entry := self.entry(index)) is not None)
+        return (entry for index in range(len(self._lines)) if (entry := self.entry(index)) is not None)
 
     def close(self) -> None:
         """Let go of the folder."""
@@ -191,19 +181,17 @@ class Journal:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def own(self, index: int) -> JournalEntry | None:
+    def _own(self, index: int) -> JournalEntry | None:
         """Return the last line of a variant as it was written; None if there is none."""
-        place = index - self._first
-        if not 0 <= place < len(self._lines) or self._lines[place] == NOT_THERE:
+        if not 0 <= index < len(self._lines) or self._lines[index] == NOT_THERE:
             return None
-        self._file.seek(self._lines[place])
+        self._file.seek(self._lines[index])
         return _entry(self._file.readline(LONGEST), self._seed)
 
     def _note(self, index: int, offset: int) -> None:
-        place = index - self._first
-        while len(self._lines) <= place:
+        while len(self._lines) <= index:
             self._lines.append(NOT_THERE)
-        self._lines[place] = offset
+        self._lines[index] = offset
 
     def _open(self, path: Path) -> IO[bytes]:
         """Open the journal's file with whole lines only: those of this batch, or just a head."""
@@ -255,16 +243,6 @@ class Journal:
                 entry = _entry(line, self._seed)
                 if entry is not None:
                     yield line, entry
-
-
-def batch_in(out: Path) -> str | None:
-    """Return the identity of the batch whose journal is in a folder; None if there is none, or a damaged one."""
-    try:
-        with open(out / JOURNAL, "rb") as file:
-            head = _head(file.readline(LONGEST))
-    except OSError:
-        return None
-    return None if head is None else head["batch"]
 
 
 def _lines(file: IO[bytes]) -> Iterator[bytes]:
@@ -325,12 +303,12 @@ def _another(out: Path, name: str) -> UnitcadError:
     )
 
 
-def _lock(out: Path, head: BatchHead, beside: Collection[str]) -> FileLock:
+def _lock(out: Path, head: BatchHead) -> FileLock:
     lock = FileLock(out / LOCK, blocking=False, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not (out / JOURNAL).exists():
-            _check_free(out, head, beside)
+            _check_free(out, head)
         lock.acquire()
     except (FileExistsError, NotADirectoryError):
         raise files.in_the_way(out) from None
@@ -343,12 +321,10 @@ def _lock(out: Path, head: BatchHead, beside: Collection[str]) -> FileLock:
     return lock
 
 
-def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
+def _check_free(out: Path, head: BatchHead) -> None:
     """Refuse a folder that is not empty and has no journal, unless its table names this batch."""
-    if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
+    if all(path.name == LOCK for path in out.iterdir()):
         return
-    if any(out.glob(SHARDS)):
-        raise UnitcadError(f"{out}: has shards, which unitcad batch merge joins; else choose another folder with -o")
     if not (out / LOCK).exists():
         raise UnitcadError(f"{out}: has files that are no batch's result; choose another folder with -o")
     try:

@@ -22,14 +22,10 @@ from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import code_version
-from unitcad.pipeline.subjects import subject_of_data
 from unitcad.pipeline.write import replacing, sync
 from unitcad.sweeps.journal import RecordPlace
-from unitcad.validation import default_template, read
 
 _INSIDE = re.compile(r"[^/\\:\0][^\\:\0]*")
-LARGEST_SPECS = 800
-"""Bytes a variant of deflated specs that a task carries; larger ones (a body's mesh) go by the store."""
 
 
 class _Record(msgspec.Struct, frozen=True):
@@ -120,29 +116,10 @@ def offer_bundle(store: SharedStore, geometry: str, bundle: Bundle, *, anew: boo
     return store.enter(_key(geometry), vars(bundle), anew=anew)
 
 
-def pack_specs(store: SharedStore, specs: Sequence[str]) -> bytes | str:
-    """Return specs deflated; the SHA-256 under which the store has them if they are large."""
-    deflating = zlib.compressobj(9, zdict=_dictionary())
-    packed = deflating.compress(msgspec.json.encode(list(specs))) + deflating.flush()
-    return packed if len(packed) <= LARGEST_SPECS * len(specs) else store.keep(packed)
-
-
-def unpack_specs(store: SharedStore, packed: bytes | str) -> list[str]:
-    """Return the specs of `pack_specs`."""
-    content = store.content(packed) if isinstance(packed, str) else packed
-    return msgspec.json.decode(zlib.decompressobj(zdict=_dictionary()).decompress(content), type=list[str])
-
-
 @cache
 def store_at(address: str) -> SharedStore:
     """Return the process's store at an address: it knows its own writes."""
     return SharedStore(address)
-
-
-@cache
-def _dictionary() -> bytes:
-    """Return the text of a typical spec: deflated against it, other specs are little more than their differences."""
-    return msgspec.json.encode([subject_of_data(read(default_template())).text])
 
 
 def _key(geometry: str) -> str:

@@ -1,10 +1,11 @@
-"""The destination of a batch, and folders made from a store."""
+"""The options of a batch, the destination that they ask for, and folders made from a store."""
 
 from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -12,13 +13,43 @@ from msgspec import MsgspecError
 from msgspec.json import decode
 
 from unitcad import files
-from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
+from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, MissingContent, SharedStore, absolute
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.write import STORE, placing, whole
-from unitcad.sweeps.destination import Destination, Folders, InStore, Receiver, is_made, note_store, store_noted
+from unitcad.spec.raw import OUTPUTS
+from unitcad.sweeps.destination import Destination, Folders, InStore, is_made, note_store, store_noted
 from unitcad.sweeps.journal import JOURNAL, JournalEntry, RecordPlace
 from unitcad.sweeps.record_packs import export, read_record
-from unitcad.sweeps.shards import BatchOptions
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """Options of a run.
+
+    `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
+    of finished variants, not only their sizes. `store` is the address (a folder, s3://bucket/path)
+    of a store that workers write to; with `folders` each variant also has its folder, with None if there are few.
+    `tables` are names of results.TABLES, None chooses by the number of variants.
+
+    Raises WrongArgument for an address that is no store's.
+    """
+
+    only: Sequence[str] = OUTPUTS
+    check: bool = True
+    keep_going: bool = False
+    timeout: float | None = None
+    limit: int | None = None
+    cache: Path | None = None
+    cache_mb: float = DEFAULT_LIMIT_MB
+    verify: bool = False
+    store: str | None = None
+    folders: bool | None = None
+    tables: Sequence[str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.store is not None:
+            absolute(self.store)
+
 
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""
@@ -27,22 +58,19 @@ FOLDERS_BELOW = 1000
 def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskStore, remote: bool) -> Destination:
     """Return the destination of a batch in `out`. Raises UnitcadError for a store that can't be used.
 
-    Without folders a batch reuses the store that an earlier run noted, unless another one is given.
+    A batch without folders, or by `remote` workers, reuses the store that an earlier run noted, unless another one is
+    given; its own store is in `out`.
     """
-    address = options.store
-    if address is None and not folders_wanted(options, variants):
+    folders, address = folders_wanted(options, variants), options.store
+    if address is None and folders and not remote:
+        return Folders(out, cache, options.verify, lru_cache(partial(_earlier_store, out)))
+    if address is None:
         address = store_noted(out)
+    store = SharedStore(absolute(address or str(out / STORE)))
+    destination = InStore(store, options.verify, None if address or remote else cache, apart=remote)
     if address is not None:
-        address = absolute(address)
-        store = InStore(SharedStore(address), options.verify, None, apart=remote)
-        note_store(out, address)
-        return store
-    kept = lru_cache(partial(_earlier_store, out))
-    if remote:
-        return Receiver(out, cache, options.verify, kept)
-    if folders_wanted(options, variants):
-        return Folders(out, cache, options.verify, kept)
-    return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
+        note_store(out, store.address)
+    return destination
 
 
 def _earlier_store(out: Path) -> SharedStore | None:
@@ -53,26 +81,16 @@ def _earlier_store(out: Path) -> SharedStore | None:
 
 
 def folders_wanted(options: BatchOptions, variants: int) -> bool:
-    """Tell whether each variant of a batch has a folder: if asked for, or below FOLDERS_BELOW variants of no shard."""
+    """Tell whether each variant of a batch has a folder: if asked for, or below FOLDERS_BELOW variants."""
     if options.folders is not None:
         return options.folders
-    return variants < FOLDERS_BELOW and options.shard is None
+    return variants < FOLDERS_BELOW
 
 
-_BATCH = "the same batch with"
+def make_folders(out: Path, entries: Iterable[JournalEntry], store: SharedStore, cache: DiskStore) -> None:
+    """Make the missing and incomplete folders in `out` of variants in a store.
 
-
-def make_folders(
-    out: Path,
-    entries: Iterable[JournalEntry],
-    store: SharedStore,
-    cache: DiskStore,
-    maker: str = _BATCH,
-    then: Callable[[Path], object] = lambda folder: None,
-) -> None:
-    """Make the missing and incomplete folders in `out` of variants in a store; call `then` with each.
-
-    Raises UnitcadError for lost contents, which the `maker` makes again, and OSError.
+    Raises UnitcadError for lost contents, and OSError.
     """
     done: set[str] = set()
     with files.scratch(out) as scratch:
@@ -85,13 +103,12 @@ def make_folders(
             try:
                 export(store, entry.record, out / entry.folder, cache, partial(placing, scratch=scratch))
             except MissingContent as error:
-                raise lost(entry, error, maker) from None
-            then(out / entry.folder)
+                raise _lost(entry, error) from None
 
 
-def lost(entry: JournalEntry, error: MissingContent, maker: str = _BATCH) -> UnitcadError:
-    """Return the error for a variant whose record or content a store has lost; the `maker` makes it again."""
-    return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes missing contents again")
+def _lost(entry: JournalEntry, error: MissingContent) -> UnitcadError:
+    """Return the error for a variant whose record or content a store has lost."""
+    return UnitcadError(f"variant {entry.index}: {error}; the same batch with --verify makes missing contents again")
 
 
 def export_variants(
@@ -109,7 +126,7 @@ def export_variants(
         try:
             export(store, place, out / entry.folder, cache)
         except MissingContent as error:
-            raise lost(entry, error) from None
+            raise _lost(entry, error) from None
         except (FileExistsError, NotADirectoryError):
             raise files.in_the_way(out) from None
         yield out / entry.folder

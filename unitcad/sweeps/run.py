@@ -11,23 +11,22 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from unitcad import __version__
-from unitcad.cache import DiskStore, absolute, collect, default_root, digest
+from unitcad.cache import DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.pipeline.plan import check_outputs, code_version, kernel_versions
+from unitcad.pipeline.plan import check_outputs, kernel_versions
 from unitcad.pipeline.subjects import subject
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.destination import Destination, InStore, note_address
+from unitcad.sweeps.destination import Destination, InStore
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary
-from unitcad.sweeps.result_folders import destination_of, folders_wanted, make_folders
+from unitcad.sweeps.result_folders import BatchOptions, destination_of, folders_wanted, make_folders
 from unitcad.sweeps.results import columns_of, write_results, write_timings
-from unitcad.sweeps.shards import BatchOptions, Shard, ShardRecord, write_shard
 from unitcad.sweeps.sweep import MOST, Sweep
 from unitcad.sweeps.task import Job, Task, VariantOutcome
 from unitcad.workers import WorkerEnded
@@ -64,16 +63,15 @@ def run(
     """
     head = batch_head(sweep, check_outputs(options.only), options)
     count = count_variants(sweep, options.limit)
-    indices = options.shard.indices(count) if options.shard else range(count)
-    summary = Summary(len(indices))
+    summary = Summary(count)
     cache = DiskStore(options.cache or default_root())
-    journal = Journal(out, head, first=indices.start)
+    journal = Journal(out, head)
     try:
         destination = destination_of(out, options, summary.variants, cache, remote)
     except BaseException:
         journal.abandon()
         raise
-    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, destination, summary, indices)
+    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, destination, summary)
     if journal.damaged:
         summary.warnings.append(
             f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
@@ -81,18 +79,14 @@ def run(
     start = time.perf_counter()
     try:
         clear_leftovers(out)
-        if options.shard:
-            write_shard(out, shard_record(out, sweep, head, options, count))
         batch.all()
         if batch.lost:
             clear_leftovers(out)
         if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
             make_folders(out, journal.entries(), destination.store, cache)
-        estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
-        found = swept_estimate(sweep, summary.variants) if estimated else None
+        found = swept_estimate(sweep, count) if "estimate" in head.outputs else None
         summary.warnings += insensitive_warnings(found)
-        columns = columns_of(sweep, journal)
-        write_results(out, columns, journal.entries, head, found, options.tables, count)  # those of a shard are parts
+        write_results(out, columns_of(sweep, journal), journal.entries, head, found, options.tables, count)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, workers)
         watch(summary, None)
@@ -116,9 +110,8 @@ def trim(options: BatchOptions) -> None:
 
 def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> BatchHead:
     """Return the batch's identity, for its journal and its tables."""
-    parts = () if options.shard is None else (options.shard, count_variants(sweep, options.limit))
     return BatchHead(
-        batch=digest(repr((sweep.hash, only, options.check, *parts)).encode())[:16],
+        batch=digest(repr((sweep.hash, only, options.check)).encode())[:16],
         name=sweep.name,
         mode=sweep.mode,
         bases=[base for base, _ in sweep.bases],
@@ -151,11 +144,10 @@ class _Batch:
 
     def __init__(
         self, sweep: Sweep, options: BatchOptions, executor: Executor, room: int,
-        watch: Watch, journal: Journal, destination: Destination, summary: Summary, indices: range,
+        watch: Watch, journal: Journal, destination: Destination, summary: Summary,
     ) -> None:  # fmt: skip
         self.sweep, self.options, self.executor, self.room = sweep, options, executor, room
         self.watch, self.journal, self.destination, self.summary = watch, journal, destination, summary
-        self.indices, self.turn = indices, _turn(options.shard)
         self.only = check_outputs(options.only)
         self.coming = self._to_make()
         self.groups: dict[str, _GeometryJobs] = {}
@@ -164,7 +156,7 @@ class _Batch:
         self.tried: set[int] = set()
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
-        self.running: dict[Future[tasks.Answer], Task] = {}
+        self.running: dict[Future[list[VariantOutcome]], Task] = {}
         self.lost = False  # whether a worker ended in the middle of its task
 
     def all(self) -> None:
@@ -183,7 +175,7 @@ class _Batch:
         Variants that failed before come last: a batch that stops at a failure has made all others by then.
         """
         failed: list[int] = []
-        for index in self.indices:
+        for index in range(self.summary.variants):
             entry = self.journal.entry(index)
             if entry is not None and self.destination.stands(entry):
                 self._finished(VariantOutcome(index, entry.status), fresh=False)
@@ -197,10 +189,9 @@ class _Batch:
     def _fill(self) -> bool:
         """Bring up to STEP variants into the window; return whether more may follow.
 
-        Those that are refused or equal to another one are noted at once. A shard fills the whole window, since it
-        chooses its first variant in it.
+        Those that are refused or equal to another one are noted at once.
         """
-        for _ in range(WINDOW if self.options.shard else STEP):
+        for _ in range(STEP):
             if self.waiting >= WINDOW or self.summary.stopped:
                 return False
             index, entry = next(self.coming, (None, None))
@@ -239,9 +230,9 @@ class _Batch:
         if self.again:
             key, job = self.again.popleft()
             return key, [job]
-        fresh = [k for k, g in self.groups.items() if g.jobs and not g.making and _short(k) not in self.made]
-        new = fresh[int(len(fresh) * self.turn)] if fresh else None
-        key = new or next((k for k, g in self.groups.items() if g.jobs and not g.making), None)
+        ready = [key for key, group in self.groups.items() if group.jobs and not group.making]
+        new = next((key for key in ready if _short(key) not in self.made), None)
+        key = new or next(iter(ready), None)
         if key is None:
             return None
         group = self.groups[key]
@@ -256,7 +247,7 @@ class _Batch:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
             try:
-                outcomes = tasks.outcomes(future.result())
+                outcomes = future.result()
             except WorkerEnded as error:
                 self._lost(task, error)
             except UnitcadError:  # with NoWorker: if no worker can start, none of the others can be made either
@@ -303,7 +294,7 @@ class _Batch:
             self.again.append((key, job))
             return
         self.tried.discard(outcome.index)
-        self._finished(self.destination.take(outcome, key))
+        self._finished(self.destination.take(outcome))
 
     def _finished(self, outcome: VariantOutcome, fresh: bool = True, before: bool = True) -> None:
         """Count a variant that has ended, and note it if it is `fresh`; others are from `before`, or another's twin."""
@@ -340,27 +331,6 @@ def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry 
     summary.failed += 1
     if len(summary.failures) < MOST_FAILURES and (found := entry()) is not None:
         summary.failures.append(Failure(found.index, found.status, found.reason, found.folder))
-
-
-def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
-    """Return the head of a shard's journal: that of the batch without shards."""
-    assert options.shard
-    whole = batch_head(sweep, check_outputs(options.only), replace(options, shard=None))
-    return ShardRecord(
-        number=options.shard.number,
-        of=options.shard.of,
-        variants=count,
-        head=whole,
-        shard_head=head,
-        code=code_version(),
-        store=note_address(out, absolute(options.store or "")),
-        sweep=replace(sweep, written=()),  # paths of this machine
-    )
-
-
-def _turn(shard: Shard | None) -> float:
-    """Return a shard's first place in the window: shards that start together then make different geometries."""
-    return (shard.number - 1) / shard.of if shard else 0.0
 
 
 def _short(key: str) -> int:

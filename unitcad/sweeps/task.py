@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import pickle
 import time
-import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -47,9 +45,8 @@ class Job:
 class Task:
     """Variants of one geometry, and how to make them.
 
-    With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.pack_specs`; work is
-    then shared by `cache` if there is one, else by the store. With `out` and `cache` (folders that the worker
-    reaches) results go there. Without, they are in the outcomes, and `known` are the caller's files of this geometry.
+    With `store` (an address) results go there; work is then shared by `cache` if there is one, else by the store.
+    Without, they go to folders in `out`, with a `cache`.
     `allowed` is the code that the caller may run, and so may the worker.
     """
 
@@ -58,11 +55,9 @@ class Task:
     only: tuple[str, ...]
     check: bool
     timeout: float | None = None
-    out: Path | None = None
+    out: Path = Path()
     cache: Path | None = None
-    known: Bundle | None = None
     store: str | None = None
-    specs: bytes | str = b""
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
@@ -71,8 +66,7 @@ class Task:
 class VariantOutcome:
     """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json.
 
-    `record` is the place of the files in a store. `product`, `contents` and `bundle` are set only if the caller places
-    the files.
+    `record` is the place of the files in a store. `product` and `bundle` do not leave the worker.
     """
 
     index: int
@@ -86,35 +80,24 @@ class VariantOutcome:
     manifest: str = ""
     record: RecordPlace | None = None
     product: Product | None = None
-    contents: dict[str, bytes] = field(default_factory=dict)
     bundle: Bundle | None = None
 
 
-Answer = list[VariantOutcome] | bytes
-
-
-def work(task: Task) -> Answer:
-    """Make a task's variants; return the argument of `outcomes`. An error of one of them is in its outcome."""
+def work(task: Task) -> list[VariantOutcome]:
+    """Make a task's variants. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
     if task.store:
-        return zlib.compress(pickle.dumps(_into_store(task, record_packs.store_at(task.store))))
-    if task.out is None:
-        return _each(task.jobs, task, lambda job, known: _remotely(job, task, known))
-    return _into_folders(task, task.out)
-
-
-def outcomes(answer: Answer) -> list[VariantOutcome]:
-    """Return the outcomes in a task's answer. It is a pickle of a worker's, as all that the executor brings."""
-    return pickle.loads(zlib.decompress(answer)) if isinstance(answer, bytes) else answer
+        return _into_store(task, record_packs.store_at(task.store))
+    return _into_folders(task)
 
 
 def _each(
     jobs: Sequence[Job], task: Task, make: Callable[[Job, Bundle | None], VariantOutcome], known: Bundle | None = None
 ) -> list[VariantOutcome]:
     """Make each variant; an error is its outcome. `make` gets the known files of the geometry."""
-    done, known = [], known or task.known
+    done = []
     for job in jobs:
         start = time.perf_counter()
         try:
@@ -131,12 +114,10 @@ def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
     """Make a task's variants, put new contents into the store, and return rows: when they return, all is there."""
     anew = any(job.damaged for job in task.jobs)
     try:
-        specs = record_packs.unpack_specs(store, task.specs)
         known = None if anew or task.cache else record_packs.known_bundle(store, task.geometry)
     except Exception as error:
         return [failure(job.index, error) for job in task.jobs]
-    jobs = [replace(job, spec=spec) for job, spec in zip(task.jobs, specs, strict=True)]
-    done = _each(jobs, task, lambda job, known: _deliver(job, task, known, store, anew), known)
+    done = _each(task.jobs, task, lambda job, known: _deliver(job, task, known, store, anew), known)
     try:
         places = record_packs.pack(store, [outcome.product for outcome in done if outcome.product])
     except Exception as error:
@@ -180,22 +161,22 @@ def failure(index: int, error: BaseException) -> VariantOutcome:
     return VariantOutcome(index, FAILED, reason=" ".join(text.split()))
 
 
-def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
+def _into_folders(task: Task) -> list[VariantOutcome]:
     """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk."""
     try:
-        with files.scratch(out) as scratch:
-            done = _each(task.jobs, task, lambda job, known: _locally(job, task, out, scratch))
+        with files.scratch(task.out) as scratch:
+            done = _each(task.jobs, task, lambda job, known: _locally(job, task, scratch))
     except OSError as error:
         return [failure(job.index, error) for job in task.jobs]
-    folders.sync(out / outcome.folder for outcome in done if outcome.folder)
+    folders.sync(task.out / outcome.folder for outcome in done if outcome.folder)
     return done
 
 
-def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
-    """Make a variant into its folder in `out`."""
+def _locally(job: Job, task: Task, scratch: Path) -> VariantOutcome:
+    """Make a variant into its folder in `task.out`."""
     assert task.cache is not None
     spec = subject_of_text(job.spec)
-    folder = out / spec.folder_name
+    folder = task.out / spec.folder_name
     manifest = _finished_manifest(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
@@ -203,21 +184,6 @@ def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
     before = Counter(store.counts)
     built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
     return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
-
-
-def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
-    """Make a variant in memory and return it: contents that the caller has are only named."""
-    spec = subject_of_text(job.spec)
-    store = MemoryStore(known)
-    product = spec.make(task.only, task.check, store, Progress())
-    outcome = _of_product(job, spec, product, store.counts)
-    needed = set(product.shared.values()) & set(store.contents)
-    return replace(
-        outcome,
-        product=product,
-        contents={sha: store.contents[sha] for sha in sorted(needed)},
-        bundle=store.bundle() if outcome.built else None,
-    )
 
 
 def _outcome(

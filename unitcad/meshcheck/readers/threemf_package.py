@@ -86,7 +86,8 @@ def stream(
                 raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
             parser.Parse(chunk, False)
             seen += len(chunk)
-        parser.Parse(b"", True)
+        chunk = b""
+        parser.Parse(chunk, True)
     except expat.ExpatError as error:
         line = [Location(part=part, line=error.lineno)]
         at = parser.ErrorByteIndex - seen
