@@ -126,9 +126,6 @@ def xml_attribute(text: str) -> str:
     return '"' + value.replace('"', "&quot;") + '"'
 
 
-"""How MessagePack begins a double whose exponent is all ones; other bytes may look so too."""
-
-
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> str:
     """Return a table; numbers are shown to four digits, None as a dash."""
     lines = [f"<caption>{escape(caption)}</caption>"] if caption else []

@@ -38,7 +38,7 @@ from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of, text_of
 from unitcad.text import join_words
 from unitcad.validation import custom_templates, default_template, from_data, templates
-from unitcad.validation.load import apply_changes, named_file, override, shipped_files
+from unitcad.validation.load import named_file, override, shipped_files
 from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, put
 from unitcad.validation.suggestions import every_fault, numbers
 
@@ -52,28 +52,23 @@ _UNIT = re.compile(r"((?:place\.\d+\.)?unit)(?:\.(.+))?")
 """The path of a unit, or of a value in it."""
 
 
-def with_changes(
-    written: Mapping[str, Any], file: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]
-) -> dict[str, Any]:
+def with_changes(written: Mapping[str, Any], file: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return an expanded array's plain data with changes by `changes_of` put in: those of values in units last.
 
     `file`: the data as the file has it, of which a unit whose `like` is changed keeps its other keys.
     """
-    whole, inside = override(written, ()), []
-    for change in changes:
-        path = (change.partition("=")[0] if isinstance(change, str) else change[0]).strip()
+    whole, inside = override(written, ()), {}
+    for path, value in changes.items():
         unit = _UNIT.fullmatch(path)
         if unit is None:
-            whole = apply_changes(whole, [change])
+            put(whole, path, value)
         elif unit[2] in (None, "like"):
-            value = at(apply_changes({}, [change]), path)
-            if unit[2]:
-                own = at(file, unit[1])
-                value = {**(own if isinstance(own, dict) else {}), "like": value}
-            whole = apply_changes(whole, [(unit[1], unit_data(value, unit[1], Path()))])
+            own = at(file, unit[1])
+            given = {**(own if isinstance(own, dict) else {}), "like": value} if unit[2] else value
+            put(whole, unit[1], unit_data(given, unit[1], Path()))
         else:
-            inside.append(change)
-    return apply_changes(whole, inside)
+            inside[path] = value
+    return override(whole, inside)
 
 
 def expand(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
@@ -430,7 +425,7 @@ def _check_held(
 def _accepted(data: Mapping[str, Any], field: str, value: object) -> bool:
     """Tell whether plain data is accepted with another value in a field."""
     try:
-        array_of(apply_changes(data, [(field, value)]))
+        array_of(override(data, {field: value}))
     except UnitcadError:
         return False
     return True

@@ -180,17 +180,7 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
     >>> [layer.name for layer in unitcad.tissue()]
     ['skin', 'hypodermis', 'muscle', 'bone']
     """
-    return _tissue(name, own) if own else _read_tissue(name)
-
-
-@cache
-def _read_tissue(name: str) -> tuple[Tissue, ...]:
-    return _tissue(name, {})
-
-
-def _tissue(name: str, own: Mapping[str, Mapping[str, TissueEntry]]) -> tuple[Tissue, ...]:
-    shipped = _raw("tissue.toml")
-    known: dict[str, Mapping[str, Any]] = {**shipped, **own}
+    known: dict[str, Mapping[str, Any]] = {**_raw("tissue.toml"), **(own or {})}
     if name not in known:
         raise unknown_name("estimate.tissue", name, known)
     layers = [_entry(Tissue, layer, _plain(table), f"tissue.{name}.{layer}") for layer, table in known[name].items()]

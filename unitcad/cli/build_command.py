@@ -23,7 +23,9 @@ from unitcad.cli.shared_options import (
     Formats,
     NoCheck,
     Only,
+    Out,
     Sets,
+    Specs,
     allow_code,
     expect_commas,
     names_in,
@@ -158,10 +160,8 @@ def _across(spec: Spec, parts: list[PartRecord]) -> str:
 
 
 def build(
-    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="Spec or array files, or names of templates.")],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the result's folder.")] = Path(
-        "out"
-    ),
+    specs: Specs,
+    out: Out = Path("out"),
     fit: Fit = None,
     sets: Sets = None,
     formats: Formats = None,

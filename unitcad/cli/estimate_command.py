@@ -12,7 +12,7 @@ from rich.text import Text
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.catalogue import FREQUENCIES_HZ
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
-from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
+from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec
@@ -299,7 +299,7 @@ _MOST_FREQUENCIES = 1000
 
 
 def estimate(
-    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="Spec or array files, or names of templates.")],
+    specs: Specs,
     model: Annotated[
         str,
         typer.Option(

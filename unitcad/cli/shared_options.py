@@ -29,6 +29,8 @@ Fit = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="A lab-fit.toml of unitcad fit. Default: the shipped models' constants."),
 ]
+Specs = Annotated[list[str], typer.Argument(metavar="SPEC...", help="Spec or array files, or names of templates.")]
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the result's folder.")]
 Formats = Annotated[
     str | None,
     typer.Option(metavar="NAMES", help="Formats of the files: stl,3mf,step,svg,png,glb,pdf. Default: the spec's."),

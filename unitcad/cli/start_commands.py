@@ -13,7 +13,7 @@ from msgspec import to_builtins
 from unitcad import catalogue
 from unitcad.casting.coupon import Coupon, write
 from unitcad.cli.output import print_json
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.shared_options import AsJson, Out
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import names_device, write_new
@@ -126,9 +126,7 @@ def coupon(
     printer: Annotated[
         str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the coupon's folder.")] = Path(
-        "out"
-    ),
+    out: Out = Path("out"),
     as_json: AsJson = False,
 ) -> None:
     """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""

@@ -11,13 +11,12 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from unitcad import catalogue, files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.catalogue import Material, MaterialEntry, materials
-from unitcad.cli.output import console, print_json, progress, warn
+from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
 from unitcad.errors import Refusal, unknown_name
 from unitcad.export.chart import Series, chart
@@ -374,20 +373,23 @@ def _print_tensile(name: str, result: TensileResult, found: dict[str, Any]) -> N
     screen = console()
     low, high = result.low / 1e3, result.high / 1e3
     screen.print(f"{name}: {result.value / 1e3:.4g} kPa ({low:.4g} to {high:.4g}), {result.method}", soft_wrap=True)
-    screen.print(f"  {found['quasistatic']}", soft_wrap=True)
-    table = Table("method", "kPa", "by specimen", "remark")
+    print_indented(found["quasistatic"])
+    rows = []
     for row in result.rows:
-        value = "-" if row.value is None else f"{row.value / 1e3:.4g}"
-        each = " ".join("-" if one is None else f"{one / 1e3:.4g}" for one in row.by_specimen[:8])
-        table.add_row(row.method, value, each if len(row.by_specimen) > 1 else "", row.reason)
-    screen.print(table)
-    screen.print(
-        f"  range: the methods that could be defended differ by {result.spread:.3g}; "
-        f"specimens {_percent(result.scatter)}, cross-section {_percent(result.geometry)}",
-        soft_wrap=True,
+        each = " ".join(map(_kilopascals, row.by_specimen[:8])) if len(row.by_specimen) > 1 else ""
+        cells = {"method": row.method, "kPa": _kilopascals(row.value), "by specimen": each, "remark": row.reason}
+        rows.append(cells)
+    print_table(rows)
+    print_indented(
+        f"range: the methods that could be defended differ by {result.spread:.3g}; "
+        f"specimens {_percent(result.scatter)}, cross-section {_percent(result.geometry)}"
     )
     for one in result.warnings:
         warn(f"warning: {one.code}: {one.message}")
+
+
+def _kilopascals(modulus: float | None) -> str:
+    return "-" if modulus is None else f"{modulus / 1e3:.4g}"
 
 
 def _percent(half_width: float | None) -> str:

@@ -12,15 +12,14 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import Item, to_csv
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
 from unitcad.catalogue import printers
-from unitcad.cli.output import console, print_json, progress, warn
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.output import print_indented, print_json, print_table, progress, warn
+from unitcad.cli.shared_options import AsJson, Out
 from unitcad.export import printing, svg
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready
@@ -487,9 +486,7 @@ def phantom(
     source: Annotated[
         str, typer.Argument(metavar="[PHANTOM]", help="Phantom file, or name of a shipped one (unitcad list phantoms).")
     ] = "skin",
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the phantom's folder.")] = Path(
-        "out"
-    ),
+    out: Out = Path("out"),
     png: Annotated[bool, typer.Option("--png", help="Also draw the box taken apart, box.png.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -530,22 +527,28 @@ def phantom(
 
 def _print(made: PhantomSet) -> None:
 
-    screen, e = console(), made.expected
-    layers = Table("layer", "silicone", "thinner", "kPa", "mm", "0.1 mm thinner")
-    for layer, one in zip(made.table.layers, made.recipes, strict=True):
-        change = f"{100 * e.sensitivity[layer.name]:+.2g} %"
-        modulus = f"{one.modulus_kpa:.3g}"
-        thinner = f"{one.thinner_pct:g} %"
-        layers.add_row(layer.name, one.silicone.name, thinner, modulus, f"{layer.thickness_mm:g}", change)
-    screen.print(layers)
-    response = Table("mm", *(f"{d:g}" for d in e.distances_mm))
-    response.add_row("expected", *(f"{v:.3f}" for v in e.value))
-    response.add_row("forearm", *(f"{v:.3f}" for v in e.forearm))
-    screen.print(response)
-    screen.print(
-        f"  inside {made.inside_mm:g} mm: an echo of {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm; "
+    e = made.expected
+    print_table(
+        [
+            {
+                "layer": layer.name,
+                "silicone": one.silicone.name,
+                "thinner": f"{one.thinner_pct:g} %",
+                "kPa": f"{one.modulus_kpa:.3g}",
+                "mm": f"{layer.thickness_mm:g}",
+                "0.1 mm thinner": f"{100 * e.sensitivity[layer.name]:+.2g} %",
+            }
+            for layer, one in zip(made.table.layers, made.recipes, strict=True)
+        ]
+    )
+    curves = {"expected": e.value, "forearm": e.forearm}
+    at = [f"{distance:g}" for distance in e.distances_mm]
+    print_table(
+        [{"mm": name, **dict(zip(at, (f"{v:.3f}" for v in curve), strict=True))} for name, curve in curves.items()]
+    )
+    print_indented(
+        f"inside {made.inside_mm:g} mm: an echo of {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm; "
         f"{made.table.most_echo_pct:g} % "
         f"need walls {e.wall_mm:g} mm from the unit's centre",
-        soft_wrap=True,
+        f"repeatable, not skin-like: off the forearm template by a factor of {e.factor:.2g}",
     )
-    screen.print(f"  repeatable, not skin-like: off the forearm template by a factor of {e.factor:.2g}", soft_wrap=True)

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.estimates import rounded
@@ -19,7 +18,7 @@ from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import figures, measurements
-from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.output import print_json, print_table, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.designs import estimated_designs
 from unitcad.errors import Refusal, unknown_name
@@ -227,38 +226,33 @@ def score(
     if as_json:
         print_json(data)
         return
-    screen = console()
-    models = list(data["scores"])
-    table = Table("unit", "measured %", "80 % range", *models, title="level at the edge, %; *: fitted to it, not blind")
-    for one in data["units"]:
-        name = one["unit"] + ("" if one["blind"] else " *")
-        ends = f"{100 * one['p10']:.2g} to {100 * one['p90']:.2g}"
-        levels = [f"{100 * one['levels'][model]:.2g}" for model in models]
-        table.add_row(name, f"{100 * one['measured']:.3g}", ends, *levels)
-    table.add_section()
-    table.add_row(
-        "factor error, blind",
-        "",
-        f"coverage {data['coverage']}",
-        *[_factor_text(data["scores"][model]) for model in models],
-    )
-    screen.print(table)
+    rows = [
+        {
+            "unit": one["unit"] + ("" if one["blind"] else " *"),
+            "measured %": f"{100 * one['measured']:.3g}",
+            "80 % range": f"{100 * one['p10']:.2g} to {100 * one['p90']:.2g}",
+            **{model: f"{100 * one['levels'][model]:.2g}" for model in data["scores"]},
+        }
+        for one in data["units"]
+    ]
+    factors = {model: _factor_text(score) for model, score in data["scores"].items()}
+    blind = {"unit": "factor error, blind", "measured %": "", "80 % range": f"coverage {data['coverage']}", **factors}
+    print_table([*rows, blind], "level at the edge, %; *: fitted to it, not blind")
     if data["decay"]:
-        screen.print(_decay_table(data))
+        print_table(_decay_rows(data), "on the skin, % of the unit's own level at the edge")
 
 
-def _decay_table(data: dict[str, Any]) -> Table:
-    curves = list(data["decay_scores"])
-    table = Table("unit", "mm", "measured %", *curves, title="on the skin, % of the unit's own level at the edge")
+def _decay_rows(data: dict[str, Any]) -> list[dict[str, str]]:
+    scores = data["decay_scores"]
+    rows = []
     for one in data["decay"]:
-        cells = []
-        for name in curves:
+        row = {"unit": one["unit"], "mm": f"{one['distance_mm']:g}", "measured %": f"{100 * one['measured']:.2g}"}
+        for name in scores:
             ends = [f"{100 * one[name][key]:.2g}" for key in ("low", "high") if key in one[name]]
-            cells.append(f"{100 * one[name]['value']:.2g}" + (f" ({' to '.join(ends)})" if ends else ""))
-        table.add_row(one["unit"], f"{one['distance_mm']:g}", f"{100 * one['measured']:.2g}", *cells)
-    table.add_section()
-    table.add_row("factor error", "", "", *[_factor_text(data["decay_scores"][name]) for name in curves])
-    return table
+            row[name] = f"{100 * one[name]['value']:.2g}" + (f" ({' to '.join(ends)})" if ends else "")
+        rows.append(row)
+    factors = {name: _factor_text(score) for name, score in scores.items()}
+    return [*rows, {"unit": "factor error", "mm": "", "measured %": "", **factors}]
 
 
 def _factor_text(value: float | None) -> str:

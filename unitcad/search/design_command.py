@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from unitcad.cli.output import console, print_json, progress
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.shared_options import AsJson, Out
 from unitcad.files import path_seen_from
 from unitcad.search import design_files
 from unitcad.search.proposals import explain as explained
@@ -21,9 +21,7 @@ def design(
     target: Annotated[
         str, typer.Argument(metavar="TARGET", help="Target file, or name of a shipped one (unitcad list targets).")
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the result's folder.")] = Path(
-        "out"
-    ),
+    out: Out = Path("out"),
     explain: Annotated[
         str | None,
         typer.Option(

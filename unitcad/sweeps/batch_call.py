@@ -25,7 +25,6 @@ from unitcad.sweeps.result_folders import BatchOptions
 from unitcad.sweeps.results import TABLES
 from unitcad.sweeps.run import Watch, count_variants, run, trim
 from unitcad.sweeps.sweep import Sweep, load_sweep
-from unitcad.text import toml
 from unitcad.validation import Changes
 from unitcad.validation.plain_data import changes_of
 
@@ -186,12 +185,8 @@ def batch(
     check_number("timeout", timeout, 0.001, 1e9)
     check_number("limit", limit, 1, 1e9, whole=True)
     chosen = sweep if isinstance(sweep, Sweep) else load_sweep(path("sweep", sweep))
-    overrides = [
-        change if isinstance(change, str) else "=".join((change[0], toml(change[1]))) for change in changes_of(set)
-    ]
-    wanted = chosen.overridden(
-        [*overrides, *([] if formats is None else [f"output.formats={texts('formats', formats)}"])]
-    )
+    own = {} if formats is None else {"output.formats": texts("formats", formats)}
+    wanted = chosen.overridden({**changes_of(set), **own})
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
     stored = None if store is None else os.fspath(store)

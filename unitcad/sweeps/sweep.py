@@ -36,8 +36,9 @@ from unitcad.spec import check_plain, convert
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 from unitcad.spec.raw import RawSpec
 from unitcad.text import some
-from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
+from unitcad.validation import Changes, compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults, is_path, load_file
+from unitcad.validation.plain_data import changes_of
 
 
 def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
@@ -228,16 +229,16 @@ class Sweep:
         slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-") or "batch"
         return f"{slug}-batch" if names_device(slug) else slug
 
-    def overridden(self, overrides: Sequence[str]) -> Sweep:
-        """Return the sweep with each "path=value" put into every base; swept values win. Raises Refusal."""
-        if not overrides:
+    def overridden(self, set: Changes) -> Sweep:
+        """Return the sweep with changes put into every base; swept values win. Raises Refusal."""
+        changes = changes_of(set)
+        if not changes:
             return self
-        for text in overrides:
+        for path in changes:
             for _, data in self.bases:
-                check_path(text.partition("=")[0].strip(), data)
-        bases = tuple((name, override(data, overrides)) for name, data in self.bases)
-        set_here = (text.partition("=")[0].strip() for text in overrides)
-        return replace(self, bases=bases, fixed=(*self.fixed, *set_here))
+                check_path(path, data)
+        bases = tuple((name, override(data, changes)) for name, data in self.bases)
+        return replace(self, bases=bases, fixed=(*self.fixed, *changes))
 
     @cached_property
     def count(self) -> int:

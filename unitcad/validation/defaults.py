@@ -238,7 +238,8 @@ def warnings(spec: Spec, estimate: bool = True) -> list[str]:
     Without `estimate` those are left out that concern only the estimate.
     """
     leads = [*_leads(spec), *_roof(spec), *(_not_estimated(spec) if estimate else ()), *_circuit_stock(spec)]
-    return [*_thin_layers(spec), *leads, *_play(spec), *_design(spec)]
+    design = design_of(spec)
+    return [*_thin_layers(spec), *leads, *_play(spec), *design.advice(spec, design.dimensions(spec))]
 
 
 def _thin_layers(spec: Spec) -> list[str]:
@@ -327,8 +328,3 @@ def _play(spec: Spec) -> list[str]:
     if spec.moulds.rib_interference_mm or (2 if len(spec.layers) > 1 else 1) * play <= thinnest / 2:
         return []
     return [f"moulds.plinth_clearance_mm = {play:g} mm lets cups move by more than half of a wall of {thinnest:g} mm"]
-
-
-def _design(spec: Spec) -> list[str]:
-    design = design_of(spec)
-    return design.advice(spec, design.dimensions(spec))

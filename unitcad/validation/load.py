@@ -11,7 +11,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from unitcad.arguments import confirm_form
 from unitcad.designs import default_design
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
@@ -197,7 +196,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     >>> spec.diameter_mm, spec.motor.thickness_mm
     (15.0, 2.0)
     """
-    changes = list(changes_of(set))
+    changes = changes_of(set)
     if kind := compound_kind(source):
         raise _is_compound(kind, source)
     if isinstance(source, str | os.PathLike):
@@ -212,7 +211,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
         if not changes and not makeable:
             return spec
         data = requested_data(spec, from_data)
-    data = apply_changes(data, changes)
+    data = override(data, changes) if changes else data
     whole = with_source(data, Path())
 
     def settled(data: dict[str, Any]) -> Spec:
@@ -226,18 +225,6 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     except Refusal as first:
         every = every_fault(first, whole, lambda data: to_data(settled(data)), _sound(whole))
         raise _locate(every, data, source) from None
-
-
-def apply_changes(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
-    """Return `data` with changes by `changes_of` put in. None: the key is left out."""
-    result = dict(data)
-    for change in changes:
-        if isinstance(change, str):
-            result = override(result, [change])
-        else:
-            result = override(result, ())
-            put(result, *change)
-    return result
 
 
 def _is_compound(kind: FileKind, source: object) -> UnitcadError:
@@ -265,13 +252,12 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     return with_source(data, path.parent)
 
 
-def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Return `data` with each "path=value" put in. Raises Refusal for a path that runs through something not there."""
+def override(data: Mapping[str, Any], changes: Changes) -> dict[str, Any]:
+    """Return `data` with changes put in. Raises Refusal for a path that runs through something not there."""
     check_plain(data)
     result: dict[str, Any] = copy.deepcopy(dict(data))
-    for text in overrides:
-        path, _, raw = confirm_form(text).partition("=")
-        put(result, path.strip(), _parse(raw.strip()))
+    for path, value in changes_of(changes).items():
+        put(result, path, value)
     return result
 
 
@@ -345,14 +331,3 @@ def _file(source: Source) -> Path | None:
     known = every_template()
     text = spell_path(os.fspath(source), known) if isinstance(source, str | os.PathLike) else ""
     return Path(text) if is_path(text) and text not in known else None
-
-
-def _parse(raw: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {raw}")["value"]
-    except (ValueError, RecursionError):
-        pass
-    try:
-        return float(raw)
-    except ValueError:
-        return raw

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import copy
+import datetime
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, Protocol, cast
 
 from msgspec import Struct
 
+from unitcad.arguments import confirm_form
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, to_data
 from unitcad.spec.fields import fields_of, index_in, table_in, takes_none
@@ -133,7 +136,7 @@ def plain(node: object, field: str = "") -> Any:
     if isinstance(node, list | tuple):
         entries = cast("Iterable[object]", node)
         return [plain(value, f"{field}.{i}".lstrip(".")) for i, value in enumerate(entries)]
-    if node is None or isinstance(node, bool):
+    if node is None or isinstance(node, bool | datetime.date | datetime.time):  # `convert` refuses times
         return node
     if isinstance(node, str):
         return str(node)
@@ -162,17 +165,29 @@ def requested_data(spec: Spec, settle: Callable[[dict[str, Any]], Spec]) -> dict
         return data
 
 
-def changes_of(changes: Changes) -> Iterator[str | tuple[str, Any]]:
-    """Yield each change: a text "path=value", or a path and its plain value. Raises UnitcadError for anything else."""
+def changes_of(changes: Changes) -> dict[str, Any]:
+    """Return the plain value of each change by its path. Raises UnitcadError for anything but a dict or texts."""
     if isinstance(changes, Mapping):
         table = cast("Mapping[str, object]", changes)
-        yield from ((path, plain(value, path)) for path, value in table.items())
-    elif isinstance(changes, str):
-        yield changes
-    else:
-        given = cast("object", changes)
-        entries = list(cast("Iterable[object]", given)) if isinstance(given, Iterable) else [given]
-        wrong = [entry for entry in entries if not isinstance(entry, str)]
-        if wrong:
-            raise UnitcadError(f'set takes a dict by path or texts "path=value", not {type(wrong[0]).__name__}')
-        yield from cast("list[str]", entries)
+        return {path: plain(value, path) for path, value in table.items()}
+    given = cast("object", changes)
+    entries = list(cast("Iterable[object]", given)) if isinstance(given, Iterable) else [given]
+    texts = [given] if isinstance(given, str) else entries
+    found = {}
+    for text in texts:
+        if not isinstance(text, str):
+            raise UnitcadError(f'set takes a dict by path or texts "path=value", not {type(text).__name__}')
+        path, _, value = confirm_form(text).partition("=")
+        found[path.strip()] = _parse(value.strip())
+    return found
+
+
+def _parse(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        return text
