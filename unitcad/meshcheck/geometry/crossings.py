@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, distinct, sorted_with_order
-from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, slabs_of
+from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, meeting_pairs, slabs_of
 from unitcad.meshcheck.geometry import predicates
 from unitcad.meshcheck.geometry.mesh import area_vectors, float32_steps, same_place
 from unitcad.meshcheck.geometry.predicates import orient3d
-from unitcad.meshcheck.geometry.sieves import MOST_CONTACTS, Contacts, Planes, height_fields, planes_of, walks_of
+from unitcad.meshcheck.geometry.sieves import MOST_CONTACTS, Contacts, Planes, height_fields, planes_of
 from unitcad.meshcheck.geometry.topology import (
     Edges,
     Topology,
@@ -182,11 +181,9 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     tick()
     faces = _prepared(topology, order)
     crossings = Crossings(faces, Contacts(topology.n_shells, every, max(MOST_CONTACTS, 2 * len(order))))
-    slabs = slabs_of(steps, *faces.corners)
-    walks = walks_of(faces.planes.columns, faces.corners, faces.safe, boxes.take(order, axis=0), tick)
-    waiting: list[tuple[Ints, Ints]] = []
+    slabs, waiting = slabs_of(steps, *faces.corners), list[tuple[Ints, Ints]]()
     try:
-        for i, j in chain.from_iterable(walks):
+        for i, j in meeting_pairs(boxes.take(order, axis=0), tick):
             waiting.append(slabs.meeting(*_strangers(faces, i, j)))
             if sum(len(some) for some, _ in waiting) > _BLOCK:
                 _decide(faces, waiting, crossings)
@@ -197,8 +194,6 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
         crossings.stopped = stop
         crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
     _leaning(crossings)
-    for blocks in (crossings.crossing, crossings.covering) if len(walks) > 1 else ():  # which give some pairs twice
-        blocks[:] = [np.unique(np.sort(join_pairs(blocks), axis=1), axis=0)]
     return crossings
 
 

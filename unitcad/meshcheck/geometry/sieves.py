@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, distinct, sorted_with_order
-from unitcad.geometry.boxes import Tick, box_order, frame_of, meeting_between, meeting_pairs
 
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 
@@ -191,67 +189,3 @@ def _sides_of(columns: Floats, ids: Ints) -> list[list[Floats]]:
 
 def _dot(a: list[Floats], b: list[Floats]) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-HUB_FACES = 2000
-"""Faces that a hub has at least. Its star is a height field: its faces need no comparison with each other."""
-_HUBS = 16  # hubs, those with the most faces: each is compared with all that is left
-_PIECES = 32  # of a face, from the hub outwards
-_MOST_PIECES = 4_000_000
-Walk = Iterator[tuple[Ints, Ints]]
-
-
-def walks_of(columns: Floats, corners: Ints, safe: Ints, boxes: Ints, tick: Tick) -> list[Walk]:
-    """Return iterators over the pairs of faces to compare; those of faces at hubs give some pairs twice.
-
-    `columns` (3, n) are the vertices, `corners` (3, m) those of the faces in the order of a curve, `safe` (3, m) as
-    `crossings.Faces` has them, and `boxes` (m, 6) the faces' boxes in steps.
-    """
-    valence = np.bincount(safe[safe >= 0], minlength=columns.shape[1])
-    hubs = np.flatnonzero(valence >= HUB_FACES)
-    if not len(hubs):
-        return [meeting_pairs(boxes, tick)]
-    hubs = np.sort(hubs[np.argsort(-valence[hubs], kind="stable")][:_HUBS])
-    weight = np.zeros_like(valence)
-    weight[hubs] = valence[hubs]
-    weights = weight[corners]
-    corner = np.argmax(weights, axis=0)
-    own = np.where(weights.max(axis=0) > 0, np.take_along_axis(corners, corner[None], axis=0)[0], -1)
-    rest, around = np.flatnonzero(own < 0), boxes[own < 0]
-    walks = [_renamed(meeting_pairs(around, tick), rest, rest)]
-    for hub in hubs:
-        mine = np.flatnonzero(own == hub)
-        if not len(mine):
-            continue
-        faces, pieces = _pieces(columns, corners, mine, corner[mine])
-        if len(rest):
-            walks.append(_renamed(meeting_between(pieces, around, tick), faces, rest))
-        rest, around = np.concatenate([rest, faces]), np.concatenate([around, pieces])
-    return walks
-
-
-def _renamed(walk: Walk, here: Ints, there: Ints) -> Walk:
-    """Yield the pairs of a walk as faces, each pair once a block."""
-    for i, j in walk:
-        key = np.unique(here[i].astype(np.uint64) << np.uint64(32) | there[j].astype(np.uint64))
-        yield (key >> np.uint64(32)).astype(np.intp), (key & np.uint64(0xFFFFFFFF)).astype(np.intp)
-
-
-def _pieces(columns: Floats, corners: Ints, faces: Ints, corner: Ints) -> tuple[Ints, Ints]:
-    """Return the boxes of pieces of some faces from their hubs outwards, in steps, and the face of each.
-
-    A box is a step wider than its piece on all sides, more than rounding takes.
-    """
-    frame, n = frame_of(columns.T), max(min(_PIECES, _MOST_PIECES // len(faces)), 1)
-    part = np.linspace(0, 1, n + 1)[:, None, None]
-    ids = corners[:, faces]
-    hub, one, other = (columns[:, np.take_along_axis(ids, (corner[None] + k) % 3, axis=0)[0]].T for k in range(3))
-    ends = []
-    for far in (one, other):
-        points = (hub + part * (far - hub)).reshape(-1, 3)
-        ends.append(np.stack(frame.steps(points), axis=1).reshape(n + 1, len(faces), 3).astype(np.int32))
-    low = np.minimum(np.minimum(ends[0][:-1], ends[0][1:]), np.minimum(ends[1][:-1], ends[1][1:])) - 1
-    high = np.maximum(np.maximum(ends[0][:-1], ends[0][1:]), np.maximum(ends[1][:-1], ends[1][1:])) + 1
-    boxes = np.concatenate([low, 65_535 - high], axis=2).reshape(-1, 6).astype(np.uint16)
-    order = box_order(boxes, frame)
-    return np.tile(faces, n)[order], boxes[order]
