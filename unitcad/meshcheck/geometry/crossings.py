@@ -87,9 +87,7 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
 
     And for each of them the heights of its two faces, mm, the lower one first.
     """
-    two = edges.size == 2
-    if not edges.closed:  # two faces that run alike are turned over, not folded
-        two &= edges.balanced
+    two = (edges.size == 2) & edges.balanced  # two faces that run alike are turned over, not folded
     pair = edges.first[two]
     left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
     facing = np.einsum("ij,ij->i", areas.take(left, axis=0), areas.take(right, axis=0))
@@ -125,7 +123,7 @@ class Faces:
 
     `corners` (3, m) are their vertices, and `safe` (3, m) those whose stars are height fields, -1 for the others.
     `shell` and `original` (m,) give each face's shell and its number in the file. `several`: whether there are several
-    shells; `doubled`: whether two faces may run along an edge in one direction.
+    shells.
     """
 
     vertices: Floats
@@ -135,7 +133,6 @@ class Faces:
     shell: Ints
     original: Ints
     several: bool
-    doubled: bool
 
 
 @dataclass(eq=False)
@@ -213,7 +210,6 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
         topology.shells[order],
         topology.kept[order],
         several,
-        several or not edges.closed,
     )
 
 
@@ -268,9 +264,7 @@ def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Bools, Bools, Ints]:
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
     edge = np.flatnonzero((common >= 2) & ~clear)
     if len(edge):
-        clear[edge] = facing(faces, i[edge], j[edge]) > 0
-        if faces.doubled:
-            clear[edge] &= ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+        clear[edge] = (facing(faces, i[edge], j[edge]) > 0) & ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
     left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
     flush = np.zeros(len(i), bool)
