@@ -5,6 +5,7 @@ import pytest
 
 from unitcad.attenuation.edge.closed_form import published_path
 from unitcad.attenuation.edge.measured import measured_table, whole_ratio
+from unitcad.attenuation.edge.models import leave_one_out_logs
 from unitcad.catalogue import materials
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load
@@ -60,3 +61,10 @@ def test_the_level_has_the_constant_fitted_with_such_moduli():
     at = table.names.index("embedded E10/D30")
     level = estimate_spec(spec)["models"]["published"]["edge_level"]["value"]
     assert level == pytest.approx(s * path[at], rel=1e-4)
+
+
+def test_each_unit_is_predicted_by_constants_fitted_without_it():
+    for moduli in ("small-strain", "quasi-static"):
+        table = measured_table(moduli)
+        own = np.exp(np.mean(np.abs(leave_one_out_logs("published", table))))
+        assert own == pytest.approx(leave_one_out(table), rel=1e-6)
