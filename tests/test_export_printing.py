@@ -4,15 +4,13 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sample_bodies import all_bodies, cup
+from sample_bodies import cup
 
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import printing
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.write import build
 from unitcad.validation import load
-
-BODIES = {body.name: body for body in all_bodies()}
 
 
 def measured(vertices, faces):

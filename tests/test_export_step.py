@@ -15,7 +15,7 @@ occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 step = pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)
 import step_reader  # noqa: E402  it needs OCP
 
-QUICK = {"encapsulating", "pass-through", "three-layer"}
+QUICK = {"encapsulating", "three-layer"}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from sample_bodies import LAYER1, QUARTER, all_bodies
 
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import (
     Below,
     Common,
@@ -31,7 +30,6 @@ from unitcad.shape import (
     rounded_rectangle,
     turned,
 )
-from unitcad.validation import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 WITHOUT_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)
@@ -86,23 +84,6 @@ def test_kernels_agree_on_bodies(name):
     assert reference.solids == 1
     for tolerance in (0.1, 0.01):
         assert_mesh_within_bound(shape, mesh.segment_count(20, tolerance), reference)
-
-
-QUICK = {"single-embedded"}
-"""`python -m benchmarks.accuracy kernels --quick` compares the shipped templates in the same way."""
-
-
-@pytest.mark.parametrize(
-    "template",
-    [pytest.param(one, marks=() if one in QUICK else pytest.mark.long) for one in sorted(templates())],
-)
-def test_kernels_agree_on_every_part_of_every_template(template):
-    variant = Variant.of(template)
-    bodies = (*variant.unit, *variant.plan.tools)
-    for body in bodies:
-        reference = assert_breps_agree(body.shape)
-        assert reference.solids == 1
-        assert_mesh_within_bound(body.shape, variant.segments, reference)
 
 
 @pytest.mark.parametrize("name", LEAVES)

@@ -7,7 +7,6 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.shape import (
@@ -28,8 +27,6 @@ from unitcad.shape import (
     union,
 )
 from unitcad.shape.lettering import CHARACTERS, engraving
-
-lengths = st.floats(0.25, 50).map(mm)
 
 
 @pytest.mark.parametrize(

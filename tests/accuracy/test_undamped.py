@@ -8,12 +8,10 @@ import pytest
 
 from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, LayeredMedium
-from unitcad.attenuation.layered import LossFactor, UniformDisc
+from unitcad.attenuation.layered import UniformDisc
 
 REFERENCES = json.loads((Path(__file__).parents[1] / "attenuation" / "references" / "undamped.json").read_text())
 R = np.array([7e-3, 20e-3, 37e-3])
-OMEGA = 2 * np.pi * 250
-BONE = HalfSpace(1900, 15e9, 0.3, LossFactor(0.01))
 
 
 def _components(found):

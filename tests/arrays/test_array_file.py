@@ -78,23 +78,18 @@ REFUSED = [
     ({"layout": {"kind": "ring", "count": 4, "bands": 2}, "limb": {"radius_mm": 40}}, "layout.band_pitch_mm", 40),
     ({"layout": {"kind": "list", "points_mm": [[0, 0], [10, 0]]}}, "layout.points_mm.1", [16, 0]),
     ({"layout": {"kind": "list", "points_mm": [[3, 3], [3, 3]]}}, "layout.points_mm.1", [19, 3]),
-    ({"layout": {"kind": "grd"}}, "layout.kind", "grid"),
     ({"place": [{"at": [4, 1]}]}, "place.0.at", [3, 1]),
     ({"place": [{"at": "B4"}]}, "place.0.at", None),
     ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", 27),
     ({"array": "back-sheet", "place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", None),
-    ({"sheet": {"thickness_mm": 4}}, "sheet.thickness_mm", 2.41),
     ({"sheet": {"hold_mm": 5}}, "sheet.hold_mm", 1.4),
     ({"sheet": {"corner_mm": 30}}, "sheet.corner_mm", 10),
     ({"sheet": {"strap_slot_mm": [3, 60]}}, "sheet.strap_slot_mm.1", 50),
-    ({"sheet": {"material": "ecoflex-00-33"}}, "sheet.material", "ecoflex-00-30"),
     ({"unit": {"like": default_template(), "fpcb": {"tail_length_mm": 60}}}, "unit.fpcb.tail_length_mm", 15),
     ({"unit": {"like": default_template(), "diameter_mm": 5}}, "unit.diameter_mm", 12.2),
     ({"unit": "hex-19"}, "unit", None),
     ({"moulds": {"land_mm": 0.1}}, "moulds.land_mm", 0.8),
     ({"limb": {"cast": "curved"}}, "limb.cast", "flat"),
-    ({"limb": {"cast": "curved", "radius_mm": 40}}, "limb.cast", "flat"),
-    ({"spacing": 3}, "spacing", None),
 ]
 
 

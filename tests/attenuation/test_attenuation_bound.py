@@ -41,7 +41,7 @@ def _off(found, truth):
     return float(max(np.max(np.abs(found.u_z - truth.u_z)), np.max(np.abs(found.u_r - truth.u_r))))
 
 
-@pytest.mark.parametrize("block", [0, 1, 2, *(pytest.param(i, marks=pytest.mark.long) for i in (3, 4))])
+@pytest.mark.parametrize("block", [2, *(pytest.param(i, marks=pytest.mark.long) for i in (0, 1, 3, 4))])
 def test_error_bounds_the_true_error_of_random_cases(block):
     for seed in range(40 * block, 40 * block + 40):
         medium, load, omega, r, z, rtol = _random_case(seed)

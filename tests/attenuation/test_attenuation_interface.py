@@ -3,17 +3,13 @@
 import doctest
 import math
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import unitcad
 from unitcad import attenuation
 from unitcad.attenuation import layered
 from unitcad.errors import Refusal, UnitcadError
-
-PACKAGE = Path(unitcad.__file__).parent
 
 
 def test_the_example_of_the_docstring_runs():
@@ -37,14 +33,11 @@ FREE = attenuation.LayeredMedium([layer()], attenuation.HalfSpace(0.0, 0.0, 0.3)
     ("call", "words"),
     [
         (lambda: layer(poisson_ratio=0.5 + 1e-9), r"^layer\.poisson_ratio"),
-        (lambda: layer(poisson_ratio=-1.0), r"^layer\.poisson_ratio"),
         (lambda: layer(-1e-3), r"^layer\.thickness"),
-        (lambda: layer(math.nan), r"^layer\.thickness"),
         (lambda: layer(1e-300), r"^layer\.thickness = 1e-300: its magnitude"),
         (lambda: layer(density=-1), r"^layer\.density"),
         (lambda: layer(youngs_modulus=0.0), r"^layer\.youngs_modulus"),
         (lambda: attenuation.HalfSpace(1000, math.nan, 0.3), r"^half_space\.youngs_modulus"),
-        (lambda: attenuation.HalfSpace(math.inf, 1e5, 0.3), r"^half_space\.density"),
         (lambda: attenuation.HalfSpace(1000, 1e4, 0.4, "x"), r"^half_space\.damping = 'x': must be a LossFactor"),
         (lambda: attenuation.KelvinVoigt(-1.0), r"^damping\.viscosity"),
         (lambda: attenuation.LossFactor(math.nan), r"^damping\.tan_delta"),
@@ -54,16 +47,12 @@ FREE = attenuation.LayeredMedium([layer()], attenuation.HalfSpace(0.0, 0.0, 0.3)
         (lambda: attenuation.Point(3), r"^load\.direction = '3': unknown name"),
         (lambda: attenuation.UniformDisc(0.0), r"^load\.radius"),
         (lambda: attenuation.Point().transform(math.nan), "^k = 'nan': wavenumbers must be finite"),
-        (lambda: DISC.transform([1.0, math.inf]), "^k = 'inf': wavenumbers must be finite"),
         (lambda: FREE.compliance(10.0, 0.0), "^omega"),
         (lambda: MEDIUM.compliance(10.0, -1.0), "^omega"),
-        (lambda: MEDIUM.compliance(10.0, math.nan), "^omega"),
         (lambda: MEDIUM.compliance(0.0, 1.0), "^k = "),
-        (lambda: MEDIUM.compliance([1.0, math.nan], 1.0), "^k = "),
         (lambda: MEDIUM.compliance([1.0, -1.0], 785.0), r"^k = '\(-1\+0j\)': wavenumbers must be finite"),
         (lambda: MEDIUM.compliance(1e154, 785.0), r"wavenumbers must be finite, at most 1e\+60"),
         (lambda: MEDIUM.response("x", 785.0, 7e-3), "^load = 'x': must be a Point or a UniformDisc$"),
-        (lambda: MEDIUM.response(DISC, -1.0, 7e-3), "^omega"),
         (
             lambda: MEDIUM.response(DISC, 1e300, 7e-3),
             r"^omega = 1e\+300: .*; nearest accepted: 1e\+60$",
@@ -76,7 +65,6 @@ FREE = attenuation.LayeredMedium([layer()], attenuation.HalfSpace(0.0, 0.0, 0.3)
         (lambda: MEDIUM.response(DISC, 785.0, [7e-3, -2e-3, -1e-3]), "^r = -0.002: radii must be finite and not neg"),
         (lambda: MEDIUM.response(DISC, 785.0, [7e-3, 1e-300]), "^r = 1e-300: .*; nearest accepted: 1e-60$"),
         (lambda: MEDIUM.response(DISC, 785.0, 7e-3, z=-1e-3), "^z = "),
-        (lambda: MEDIUM.response(DISC, 785.0, 7e-3, z=1e-300), "^z = 1e-300: its magnitude"),
         (lambda: MEDIUM.response(DISC, 785.0, 7e-3, rtol=1e-15), "^rtol"),
     ],
 )

@@ -18,17 +18,13 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cup import SLOPE, ribs
 from unitcad.pipeline.plan import threemf_content
-from unitcad.pipeline.write import build, subject
+from unitcad.pipeline.write import build
 from unitcad.validation import load, templates
 
 pytestmark = [
     pytest.mark.slicer,
     pytest.mark.skipif(slicer.program() is None, reason="PrusaSlicer is not installed"),
 ]
-
-
-def folder_name(spec):
-    return subject(spec).folder_name
 
 
 SETS = [(name,) for name in sorted(templates())] + [

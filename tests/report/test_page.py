@@ -16,7 +16,6 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build
 from unitcad.report import page, read_results, write_report
 from unitcad.report.html_page import REFERENCE, Pool
-from unitcad.report.page import model
 from unitcad.validation import load, templates
 
 NAMESPACE = "http://www.w3.org/1999/xhtml"
@@ -192,38 +191,6 @@ def test_an_unreadable_spec_leaves_the_rest(built, tmp_path):
     assert "spec.toml" in record.no_model
     assert record.estimate is None
     write_report(tmp_path / "a")
-
-
-@pytest.mark.long
-def test_budget_of_a_batch(built):
-    """1,000 variants, each with numbers of its own, over 20 geometries."""
-    record = read_results.read_variant(built, built.parent)[0].as_dict()
-    pool, variants, models, rows = Pool(), [], {}, []
-    for i in range(1000):
-        mine = {**record, "folder": f"variant-{i}", "model": f"geometry{i % 20}"}
-        mine["manifest"] = {**record["manifest"], "name": f"variant {i}"}
-        mine["estimate"] = changed(record["estimate"], 1 + i / 977)
-        mine["casting"] = changed(record["casting"], 1 + i / 977)
-        variants.append([mine["folder"], pool.put(mine)])
-        rows.append([mine["folder"], *(f"value {i} of {c}" if c % 3 == 0 else i / (c + 1.7) for c in range(24))])
-    for i in range(20):
-        models[f"geometry{i}"] = (
-            model(load("three-layer", [f"layers.0.wall_mm={1.2 + i / 100}"])) if i < 5 else models[f"geometry{i - 5}"]
-        )
-    data = {
-        "title": "t", "version": "0", "variants": variants, "pool": pool.entries, "models": models,
-        "batch": None, "damaged": [], "table": {"columns": [f"column {c}" for c in range(24)], "rows": rows},
-    }  # fmt: skip
-    assert len(page.page(data, "t").encode()) <= 25_000_000
-
-
-def changed(node, factor):
-    """The same data with every number another."""
-    if isinstance(node, dict):
-        return {key: changed(value, factor) for key, value in node.items()}
-    if isinstance(node, list):
-        return [changed(item, factor) for item in node]
-    return float(f"{node * factor:.9g}") if isinstance(node, float) else node
 
 
 @pytest.mark.parametrize(

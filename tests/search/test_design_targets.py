@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-from unittest.mock import ANY
 
 import jsonschema
 import pytest
@@ -24,7 +23,6 @@ from unitcad.validation.load import shipped_files
         ({"target": {}}, "target.edge_max", "is required, or edge_min", None),
         ({}, "target", "is required", None),
         ({"target": {"edge_max": 6}}, "target.edge_max", "fraction of the motor's amplitude", 0.06),
-        ({"target": {"edge_max": 0.0}}, "target.edge_max", "at least 0.001", 0.001),
         ({"target": {"edge_max": 0.1, "edge_min": 0.2}}, "target.edge_min", "below edge_max", 0.05),
         ({"target": {"edge_max": 0.1, "crosstalk_ratio_max": 0.2}}, "target.pitch_mm", "required with", None),
         (
@@ -33,13 +31,10 @@ from unitcad.validation.load import shipped_files
             "unknown key",
             "target.diameter_max_mm",
         ),
-        ({"at_hand": {"materials": ["ecoflex"]}}, "at_hand.materials.0", "unknown name", "ecoflex-00-50"),
         ({"at_hand": {"materials": ["ecoflex-00-10"] * 2}}, "at_hand.materials.1", "is given twice", None),
-        ({"at_hand": {"printer": "prusa"}}, "at_hand.printer", "unknown name", ANY),
         ({"at_hand": {"designs": ["embeded"]}}, "at_hand.designs.0", "unknown name", "embedded"),
         ({"at_hand": {"materials": ["ecoflex-00-50"]}}, "at_hand.materials", "no level can be estimated", None),
         ({"vary": {"wall_mm": [2.0, 1.0]}}, "vary.wall_mm", "from the least to the largest", [1.0, 2.0]),
-        ({"vary": {"wall_mm": [0.1, 1.0]}}, "vary.wall_mm.0", "at least 0.5", 0.5),
         ({"vary": {"layers": [1, 9]}}, "vary.layers.1", "at most 2", 2),
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
@@ -50,7 +45,7 @@ def test_what_is_refused(data, field, limit, nearest):
     given = data if "target" in data or not data else {"target": {"edge_max": 0.06}, **data}
     with refuses(field, limit) as refused:
         candidates(target_of(given))
-    assert nearest is ANY or refused.value.nearest == nearest
+    assert refused.value.nearest == nearest
 
 
 def test_a_fault_of_a_table_for_every_spec_is_named():

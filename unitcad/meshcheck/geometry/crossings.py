@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, distinct, sorted_with_order
-from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, slabs_of
+from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, meeting_pairs, slabs_of
 from unitcad.meshcheck.geometry import predicates
 from unitcad.meshcheck.geometry.mesh import area_vectors, float32_steps, same_place
 from unitcad.meshcheck.geometry.predicates import orient3d
-from unitcad.meshcheck.geometry.sieves import MOST_CONTACTS, Contacts, Planes, height_fields, planes_of, walks_of
+from unitcad.meshcheck.geometry.sieves import MOST_CONTACTS, Contacts, Planes, height_fields, planes_of
 from unitcad.meshcheck.geometry.topology import (
     Edges,
     Topology,
@@ -88,9 +87,7 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
 
     And for each of them the heights of its two faces, mm, the lower one first.
     """
-    two = edges.size == 2
-    if not edges.closed:  # two faces that run alike are turned over, not folded
-        two &= edges.balanced
+    two = (edges.size == 2) & edges.balanced  # two faces that run alike are turned over, not folded
     pair = edges.first[two]
     left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
     facing = np.einsum("ij,ij->i", areas.take(left, axis=0), areas.take(right, axis=0))
@@ -126,7 +123,7 @@ class Faces:
 
     `corners` (3, m) are their vertices, and `safe` (3, m) those whose stars are height fields, -1 for the others.
     `shell` and `original` (m,) give each face's shell and its number in the file. `several`: whether there are several
-    shells; `doubled`: whether two faces may run along an edge in one direction.
+    shells.
     """
 
     vertices: Floats
@@ -136,7 +133,6 @@ class Faces:
     shell: Ints
     original: Ints
     several: bool
-    doubled: bool
 
 
 @dataclass(eq=False)
@@ -182,11 +178,9 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     tick()
     faces = _prepared(topology, order)
     crossings = Crossings(faces, Contacts(topology.n_shells, every, max(MOST_CONTACTS, 2 * len(order))))
-    slabs = slabs_of(steps, *faces.corners)
-    walks = walks_of(faces.planes.columns, faces.corners, faces.safe, boxes.take(order, axis=0), tick)
-    waiting: list[tuple[Ints, Ints]] = []
+    slabs, waiting = slabs_of(steps, *faces.corners), list[tuple[Ints, Ints]]()
     try:
-        for i, j in chain.from_iterable(walks):
+        for i, j in meeting_pairs(boxes.take(order, axis=0), tick):
             waiting.append(slabs.meeting(*_strangers(faces, i, j)))
             if sum(len(some) for some, _ in waiting) > _BLOCK:
                 _decide(faces, waiting, crossings)
@@ -197,8 +191,6 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
         crossings.stopped = stop
         crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
     _leaning(crossings)
-    for blocks in (crossings.crossing, crossings.covering) if len(walks) > 1 else ():  # which give some pairs twice
-        blocks[:] = [np.unique(np.sort(join_pairs(blocks), axis=1), axis=0)]
     return crossings
 
 
@@ -218,7 +210,6 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
         topology.shells[order],
         topology.kept[order],
         several,
-        several or not edges.closed,
     )
 
 
@@ -273,9 +264,7 @@ def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Bools, Bools, Ints]:
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
     edge = np.flatnonzero((common >= 2) & ~clear)
     if len(edge):
-        clear[edge] = facing(faces, i[edge], j[edge]) > 0
-        if faces.doubled:
-            clear[edge] &= ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+        clear[edge] = (facing(faces, i[edge], j[edge]) > 0) & ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
     left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
     flush = np.zeros(len(i), bool)

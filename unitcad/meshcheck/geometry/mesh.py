@@ -12,7 +12,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
-from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
+from unitcad.geometry.arrays import Floats, Ints, by_appearance, cross, distinct, order_of_packed
 
 _NO_INDEX = np.empty(0, np.int64)
 
@@ -51,15 +51,13 @@ LARGEST = float(np.finfo(np.float32).max)
 SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 """Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
 
-_BLOCK = 1 << 15  # points that stay in the processor's cache
-
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, if the format has them.
 
     `name`: the object of the file, `source`: the places of its triangles in the file. `indexed` is false if vertices
-    were shared only by their place. `single` is true if coordinates were stored as float32.
+    were shared only by their place.
     """
 
     vertices: Floats
@@ -67,7 +65,6 @@ class Mesh:
     normals: Floats | None = None
     name: str | None = None
     indexed: bool = True
-    single: bool = False
     source: Source | None = None
 
 
@@ -141,10 +138,7 @@ def _mix(bits: NDArray[np.unsignedinteger]) -> NDArray[np.uint64]:
 
 def float32_step(vertices: Floats) -> float:
     """Return the distance between neighbouring float32 numbers at the largest coordinate, mm."""
-    if not len(vertices):
-        return 0.0
-    largest = max(abs(float(vertices.min())), abs(float(vertices.max())))
-    return float(np.spacing(np.float32(min(largest, 1e38))))
+    return float(float32_steps(vertices[None])[0])
 
 
 def float32_steps(places: Floats) -> Floats:
@@ -160,16 +154,5 @@ def solid_of(vertices: Floats, faces: Ints) -> Manifold:
 
 def area_vectors(vertices: Floats, faces: Ints) -> Floats:
     """Return twice the area of each face along its normal (right-hand rule), (m, 3) mm2."""
-    columns, areas = np.ascontiguousarray(vertices.T), np.empty((len(faces), 3))
-    for start in range(0, len(faces), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        one, two, three = (corner.astype(np.intp) for corner in faces[block].T)
-        first, second = [], []
-        for column in columns:
-            origin = column.take(one)
-            first.append(column.take(two) - origin)
-            second.append(column.take(three) - origin)
-        for axis in range(3):
-            i, j = (axis + 1) % 3, (axis + 2) % 3
-            np.subtract(first[i] * second[j], first[j] * second[i], out=areas[block, axis])
-    return areas
+    origin = vertices.take(faces[:, 0], axis=0)
+    return cross(vertices.take(faces[:, 1], axis=0) - origin, vertices.take(faces[:, 2], axis=0) - origin)

@@ -4,8 +4,7 @@ orient3d(a, b, c, d) is the sign of det(a - d, b - d, c - d): positive if d is b
 that a, b, c turn anticlockwise), zero if all four are coplanar. The filter's bound is Shewchuk's (1997), for
 differences that are rounded themselves.
 
-The rest is small relative to its terms. In whole numbers, 64-bit arithmetic gives it modulo 2**64; if its bound is less
-than half of that, it is known. Python's integers decide the others.
+Python's integers decide the rest.
 
 Triangles that are not coplanar: Devillers and Guigue, "Faster triangle-triangle intersection tests" (INRIA RR-4488,
 2002): on the line of the two planes each triangle cuts an interval; two determinants compare the intervals' ends. Both
@@ -25,19 +24,16 @@ from unitcad.geometry.arrays import Bools, Floats, Ints, cross
 _EPS = np.finfo(np.float64).eps / 2
 _BOUND = {2: (3.0 + 16.0 * _EPS) * _EPS, 3: (7.0 + 56.0 * _EPS) * _EPS}  # of the sum of the terms' sizes, by axes
 _TINY = 1e-270  # more than underflow takes from a determinant of coordinates that fit single precision
-_HALF = 2.0**62
-_ZERO = 10_000  # stands for the exponent of the lowest bit of 0
-_BLOCK = 1 << 13  # rows whose intermediate values stay in the processor's cache
 
 
 def orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
     """Return the sign of orient3d for each row of four (n, 3) arrays, int8."""
-    return _signs(a, b, c, d)
+    return _orient3d_columns(a.T, b.T, c.T, d.T)
 
 
 def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
     """Return the sign of the area of each triangle a, b, c in the plane, (n, 2) arrays: positive anticlockwise."""
-    return _signs(a, b, c)
+    return orient2d_columns(a.T, b.T, c.T)
 
 
 def orient2d_columns(a: Floats, b: Floats, c: Floats) -> Ints:
@@ -55,21 +51,7 @@ def sides(a: Floats, b: Floats) -> Ints:
 
     Both are (corner, axis, n). Positive if `a` is seen anticlockwise; zero for all corners if `a` has no area.
     """
-    one, two = a[1] - a[0], a[2] - a[0]
-    normal, size = np.empty_like(one), np.empty_like(one)
-    for axis in range(3):
-        y, z = (axis + 1) % 3, (axis + 2) % 3
-        left, right = one[y] * two[z], one[z] * two[y]
-        np.subtract(left, right, out=normal[axis])
-        np.add(np.abs(left, out=left), np.abs(right, out=right), out=size[axis])
-    sign = np.empty((3, a.shape[2]), np.int8)
-    for k in range(3):
-        offset = b[k] - a[0]
-        value = offset[0] * normal[0] + offset[1] * normal[1] + offset[2] * normal[2]
-        np.abs(offset, out=offset)
-        terms = offset[0] * size[0] + offset[1] * size[1] + offset[2] * size[2]
-        sign[k] = _sure((b[k], a[1], a[2], a[0]), value, terms)
-    return sign
+    return np.stack([_orient3d_columns(corner, a[1], a[2], a[0]) for corner in b])
 
 
 def _orient3d_columns(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
@@ -89,15 +71,7 @@ def _sure(points: Sequence[Floats], value: Floats, size: Floats) -> Ints:
     sign = np.sign(value).astype(np.int8)
     unsure = np.flatnonzero(np.abs(value) <= _BOUND[len(points) - 1] * size + _TINY)
     if len(unsure):
-        sign[unsure] = _exact(np.stack([point.take(unsure, axis=1) for point in points]), size[unsure])
-    return sign
-
-
-def _signs(*points: Floats) -> Ints:
-    of = orient2d_columns if len(points) == 3 else _orient3d_columns
-    sign = np.empty(len(points[0]), np.int8)
-    for start in range(0, len(sign), _BLOCK):
-        sign[start : start + _BLOCK] = of(*(np.ascontiguousarray(point[start : start + _BLOCK].T) for point in points))
+        sign[unsure] = _exact(np.stack([point.take(unsure, axis=1) for point in points]))
     return sign
 
 
@@ -110,50 +84,25 @@ def _determinant(rows: Any) -> Any:
     return az * (bx * cy - cx * by) + bz * (cx * ay - ax * cy) + cz * (ax * by - bx * ay)
 
 
-def _exact(points: Floats, size: Floats) -> Ints:
-    """Return signs of the determinants of points (axes + 1, axes, n) that the filter leaves; `size` as in `_sure`."""
-    sign = np.zeros(len(size), np.int8)
+def _exact(points: Floats) -> Ints:
+    """Return signs of the determinants of points (axes + 1, axes, n) that the filter leaves."""
+    sign = np.zeros(points.shape[2], np.int8)
     same = points == points[-1]
     left = np.flatnonzero(
         ~(same.all(axis=0).any(axis=0) | same[:-1].all(axis=1).any(axis=0))
     )  # else two lines are zero
-    points, size = points.take(left, axis=2), size[left]
-    known, signs = _modular(points, 2 * (_BOUND[points.shape[1]] * size + _TINY))
-    sign[left[known]] = signs
-    if not known.all():
-        whole = integers(points.compress(~known, axis=2))
-        sign[left[~known]] = np.sign(_determinant(whole[:-1] - whole[-1])).astype(np.int8)
+    if len(left):
+        whole = integers(points.take(left, axis=2))
+        sign[left] = np.sign(_determinant(whole[:-1] - whole[-1])).astype(np.int8)
     return sign
-
-
-def _modular(points: Floats, bound: Floats) -> tuple[Bools, Ints]:
-    """Return which determinants, at most `bound`, 64-bit whole numbers hold, and the signs of those."""
-    lowest = _lowest_bits(points).min(axis=(0, 1), initial=_ZERO)
-    with np.errstate(over="ignore", invalid="ignore"):  # overflow is ignored
-        scaled = points * np.ldexp(1.0, -lowest)
-        known = np.ldexp(bound, -points.shape[1] * lowest) < _HALF
-        known &= np.abs(scaled).max(axis=(0, 1), initial=0) < _HALF
-    whole = (scaled if known.all() else scaled.compress(known, axis=2)).astype(np.int64)
-    return known, np.sign(_determinant(whole[:-1] - whole[-1])).astype(np.int8)
-
-
-def _lowest_bits(values: Floats) -> Ints:
-    """Return the exponent of each float's lowest bit that is set, as in 2**exponent; _ZERO for 0."""
-    mantissa, exponent = np.frexp(values)
-    digits = (mantissa * 2.0**53).astype(np.int64)
-    lowest = np.frexp((digits & -digits).astype(np.float64))[1] + exponent - 54
-    return np.where(digits == 0, _ZERO, lowest)
 
 
 def integers(values: Floats) -> np.ndarray:
     """Return the floats times one power of two that makes them all whole, as Python's integers."""
     mantissa, exponent = np.frexp(values)
     digits = (mantissa * 2.0**53).astype(np.int64)
-    shift = np.where(digits == 0, 0, exponent - exponent.min(initial=_ZERO, where=digits != 0))
+    shift = np.where(digits == 0, 0, exponent - exponent.min(initial=0, where=digits != 0))
     return digits.astype(object) << shift.astype(object)
-
-
-_PAIRS = 1 << 13  # pairs whose corners stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,15 +150,10 @@ def meet(a: Floats, b: Floats) -> Meeting:
     """
     n = len(a)
     side_a, side_b = np.ones((2, n, 3), np.int8)
-    for start in range(0, n, _PAIRS):
-        left = np.arange(start, min(start + _PAIRS, n))
-        one, other = (np.ascontiguousarray(corners[left].transpose(1, 2, 0)) for corners in (a, b))
-        for into in (side_b, side_a):
-            side = sides(one, other)
-            into[left] = side.T
-            near = np.flatnonzero(~((side > 0).all(axis=0) | (side < 0).all(axis=0)))
-            left = left[near]
-            one, other = other.take(near, axis=2), one.take(near, axis=2)
+    left = np.arange(n)
+    for one, other, into in ((a, b, side_b), (b, a, side_a)):
+        into[left] = sides(*(np.ascontiguousarray(corners[left].transpose(1, 2, 0)) for corners in (one, other))).T
+        left = left[~_one_side(into[left])]
     flat = (side_b == 0).all(axis=1)
     apart = _one_side(side_a) | _one_side(side_b)
     crosses, touches, overlaps = np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, bool)
@@ -279,16 +223,9 @@ def _off_sides(corners: Floats, points: Floats) -> Ints:
 
     Triangles are (n, 3, 2), points (n, k, 2).
     """
-    n, count = len(corners), points.shape[1]
-    sign = np.empty((3, count, n), np.int8)
-    for start in range(0, n, _PAIRS):
-        block = slice(start, start + _PAIRS)
-        at, there = (np.ascontiguousarray(of[block].transpose(1, 2, 0)) for of in (corners, points))
-        turn = orient2d_columns(*at)
-        for k in range(3):
-            for p in range(count):
-                np.multiply(orient2d_columns(at[k], at[(k + 1) % 3], there[p]), turn, out=sign[k, p, block])
-    return sign
+    at, there = (np.ascontiguousarray(of.transpose(1, 2, 0)) for of in (corners, points))
+    turn = orient2d_columns(*at)
+    return np.array([[orient2d_columns(at[k], at[(k + 1) % 3], place) * turn for place in there] for k in range(3)])
 
 
 def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:

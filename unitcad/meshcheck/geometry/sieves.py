@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, distinct, sorted_with_order
-from unitcad.geometry.boxes import Tick, box_order, frame_of, meeting_between, meeting_pairs
-
-_FACES = 1 << 14  # faces whose corners stay in the processor's cache
-
 
 MOST_CONTACTS = 1_000_000
 """Pairs of faces that `Contacts` holds, unless it is told another number."""
@@ -127,15 +122,12 @@ def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
     """Return the planes of faces from vertices (3, n), their ids (3, m) and their `area_vectors` (3, m)."""
     low, high = columns.min(axis=1), columns.max(axis=1)
     offset, longest = np.zeros((2, ids.shape[1]))
-    for start in range(0, ids.shape[1], _FACES):
-        block = slice(start, start + _FACES)
-        places = [corner[block].astype(np.intp) for corner in ids]
-        for axis, column in enumerate(columns):
-            at = [column.take(place, mode="clip") for place in places]
-            offset[block] += normal[axis, block] * at[0]
-            for k in range(3):
-                side = at[k] - at[k - 1]
-                np.maximum(longest[block], np.abs(side, out=side), out=longest[block])
+    for axis, column in enumerate(columns):
+        at = [column.take(corner) for corner in ids]
+        offset += normal[axis] * at[0]
+        for k in range(3):
+            side = at[k] - at[k - 1]
+            np.maximum(longest, np.abs(side, out=side), out=longest)
     longest *= longest
     longest *= _PLANE * float(np.maximum(-low, high).max())
     longest += _TINY
@@ -153,105 +145,32 @@ def height_fields(columns: Floats, corners: Ints, areas: Floats, whole: Bools) -
     normal of the vertex the faces of its star face one way and go round it once. Rounding moves a face's turn by 2e-5
     at most, and turns are whole.
     """
-    n, m = columns.shape[1], corners.shape[1]
-    blocks = [slice(start, start + _FACES) for start in range(0, m, _FACES)]
-    share, angle, steep = np.empty(m), np.empty((3, m)), np.empty((3, m), bool)
-    for block in blocks:
-        here = list(areas[:, block])
-        size = np.sqrt(_dot(here, here))
-        sides = _sides_of(columns, corners[:, block])
-        longest = np.maximum.reduce([_dot(side, side) for side in sides])
-        share[block] = 1 / np.where(size > _SOUND * longest, size, np.inf)
-        for k in range(3):  # a normal counts by the angle of its face there, however many faces a fan is cut into
-            np.arctan2(size, -_dot(sides[k], sides[k - 1]), out=angle[k, block])
-    angle *= share
-    along = [np.add.reduce([np.bincount(corners[k], angle[k] * area, n) for k in range(3)]) for area in areas]
-    length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
-    along = [part / length for part in along]
-    for block in blocks:
-        sides, here = _sides_of(columns, corners[:, block]), list(areas[:, block])
-        for k, corner in enumerate(corners[:, block]):
-            up = [part.take(corner) for part in along]
-            double = _dot(here, up)
-            flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
-            steep[k, block] = double * share[block] <= _FACING
-            np.arctan2(double, flat, out=angle[k, block])
+    n = columns.shape[1]
+    sides = _sides_of(columns, corners)
+    size = np.sqrt(_dot(areas, areas))
+    longest = np.maximum.reduce([_dot(side, side) for side in sides])
+    share = 1 / np.where(size > _SOUND * longest, size, np.inf)
+    along = np.zeros((3, n))
+    for k, corner in enumerate(corners):  # a normal counts by the angle of its face there, however it is cut into faces
+        weight = share * np.arctan2(size, -_dot(sides[k], sides[k - 1]))
+        for axis in range(3):
+            along[axis] += np.bincount(corner, weight * areas[axis], n)
+    along /= np.maximum(np.sqrt(_dot(along, along)), 1e-300)
     turns, seen = np.zeros(n), whole.copy()
     for k, corner in enumerate(corners):
-        seen[corner[steep[k]]] = False
-        turns += np.bincount(corner, angle[k], n)
+        up = along.take(corner, axis=1)
+        double = _dot(areas, up)
+        flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
+        seen[corner[double * share <= _FACING]] = False
+        turns += np.bincount(corner, np.arctan2(double, flat), n)
     return seen & (np.abs(turns - 2 * np.pi) < 0.1)
 
 
-def _sides_of(columns: Floats, ids: Ints) -> list[list[Floats]]:
-    """Return the sides of faces from each corner to the next, by axis."""
-    at = [[column.take(corner, mode="clip") for column in columns] for corner in ids.astype(np.intp)]
-    return [[at[(k + 1) % 3][axis] - at[k][axis] for axis in range(3)] for k in range(3)]
+def _sides_of(columns: Floats, ids: Ints) -> list[Floats]:
+    """Return the sides of faces from each corner to the next: (axis, n) each."""
+    at = [columns.take(corner, axis=1) for corner in ids]
+    return [at[(k + 1) % 3] - at[k] for k in range(3)]
 
 
-def _dot(a: list[Floats], b: list[Floats]) -> Floats:
+def _dot(a: Floats, b: Floats) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-HUB_FACES = 2000
-"""Faces that a hub has at least. Its star is a height field: its faces need no comparison with each other."""
-_HUBS = 16  # hubs, those with the most faces: each is compared with all that is left
-_PIECES = 32  # of a face, from the hub outwards
-_MOST_PIECES = 4_000_000
-Walk = Iterator[tuple[Ints, Ints]]
-
-
-def walks_of(columns: Floats, corners: Ints, safe: Ints, boxes: Ints, tick: Tick) -> list[Walk]:
-    """Return iterators over the pairs of faces to compare; those of faces at hubs give some pairs twice.
-
-    `columns` (3, n) are the vertices, `corners` (3, m) those of the faces in the order of a curve, `safe` (3, m) as
-    `crossings.Faces` has them, and `boxes` (m, 6) the faces' boxes in steps.
-    """
-    valence = np.bincount(safe[safe >= 0], minlength=columns.shape[1])
-    hubs = np.flatnonzero(valence >= HUB_FACES)
-    if not len(hubs):
-        return [meeting_pairs(boxes, tick)]
-    hubs = np.sort(hubs[np.argsort(-valence[hubs], kind="stable")][:_HUBS])
-    weight = np.zeros_like(valence)
-    weight[hubs] = valence[hubs]
-    weights = weight[corners]
-    corner = np.argmax(weights, axis=0)
-    own = np.where(weights.max(axis=0) > 0, np.take_along_axis(corners, corner[None], axis=0)[0], -1)
-    rest, around = np.flatnonzero(own < 0), boxes[own < 0]
-    walks = [_renamed(meeting_pairs(around, tick), rest, rest)]
-    for hub in hubs:
-        mine = np.flatnonzero(own == hub)
-        if not len(mine):
-            continue
-        faces, pieces = _pieces(columns, corners, mine, corner[mine])
-        if len(rest):
-            walks.append(_renamed(meeting_between(pieces, around, tick), faces, rest))
-        rest, around = np.concatenate([rest, faces]), np.concatenate([around, pieces])
-    return walks
-
-
-def _renamed(walk: Walk, here: Ints, there: Ints) -> Walk:
-    """Yield the pairs of a walk as faces, each pair once a block."""
-    for i, j in walk:
-        key = np.unique(here[i].astype(np.uint64) << np.uint64(32) | there[j].astype(np.uint64))
-        yield (key >> np.uint64(32)).astype(np.intp), (key & np.uint64(0xFFFFFFFF)).astype(np.intp)
-
-
-def _pieces(columns: Floats, corners: Ints, faces: Ints, corner: Ints) -> tuple[Ints, Ints]:
-    """Return the boxes of pieces of some faces from their hubs outwards, in steps, and the face of each.
-
-    A box is a step wider than its piece on all sides, more than rounding takes.
-    """
-    frame, n = frame_of(columns.T), max(min(_PIECES, _MOST_PIECES // len(faces)), 1)
-    part = np.linspace(0, 1, n + 1)[:, None, None]
-    ids = corners[:, faces]
-    hub, one, other = (columns[:, np.take_along_axis(ids, (corner[None] + k) % 3, axis=0)[0]].T for k in range(3))
-    ends = []
-    for far in (one, other):
-        points = (hub + part * (far - hub)).reshape(-1, 3)
-        ends.append(np.stack(frame.steps(points), axis=1).reshape(n + 1, len(faces), 3).astype(np.int32))
-    low = np.minimum(np.minimum(ends[0][:-1], ends[0][1:]), np.minimum(ends[1][:-1], ends[1][1:])) - 1
-    high = np.maximum(np.maximum(ends[0][:-1], ends[0][1:]), np.maximum(ends[1][:-1], ends[1][1:])) + 1
-    boxes = np.concatenate([low, 65_535 - high], axis=2).reshape(-1, 6).astype(np.uint16)
-    order = box_order(boxes, frame)
-    return np.tile(faces, n)[order], boxes[order]

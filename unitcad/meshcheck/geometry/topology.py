@@ -10,21 +10,17 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, extent, extents, order_of_packed
-from unitcad.geometry.boxes import Tick
+from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, extent, extents, sorted_with_order
+from unitcad.geometry.boxes import Tick, TooMany, box_pairs
 from unitcad.geometry.components import components
 from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
 
-_FACES = 1 << 14  # faces that stay in the processor's cache
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Half-edges of `faces` sorted by their undirected edge. `first` and `size` describe the groups in `order`.
-
-    `closed` is true where every edge has exactly two faces that run along it in opposite directions.
-    """
+    """Half-edges of `faces` sorted by their undirected edge. `first` and `size` describe the groups in `order`."""
 
     faces: Ints
     order: Ints
@@ -32,7 +28,6 @@ class Edges:
     size: Ints
     low: Ints
     high: Ints
-    closed: bool
 
     @cached_property
     def pairs(self) -> tuple[Ints, Ints]:
@@ -46,6 +41,11 @@ class Edges:
         last = self.first + self.size - 1
         count = np.cumsum(self.faces.reshape(-1)[self.order] == np.repeat(self.low, self.size), dtype=np.int32)[last]
         return 2 * np.diff(count, prepend=np.int32(0)) == self.size
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether every edge has exactly two faces, which run along it in opposite directions."""
+        return bool(len(self.size)) and bool((self.balanced & (self.size == 2)).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,43 +73,15 @@ def half_edges(faces: Ints) -> tuple[Ints, Ints]:
 
 def edges_of(faces: Ints, n_vertices: int) -> Edges:
     """Group the half-edges of `faces` (no face may use a vertex twice)."""
-    start = np.ascontiguousarray(faces).reshape(-1)
-    order, low, high = _sorted_edges(faces, n_vertices)
-    n = len(order)
-    fresh = np.empty(n, bool)
-    fresh[:1] = True
-    np.not_equal(low[1:], low[:-1], out=fresh[1:])
-    fresh[1:] |= high[1:] != high[:-1]
-    first = np.flatnonzero(fresh).astype(np.int32)
-    size = np.diff(np.append(first, np.int32(n)))
-    closed = n > 0 and bool((size == 2).all()) and not (start[order[0::2]] == start[order[1::2]]).any()
-    return Edges(faces, order, first, size, low[first], high[first], bool(closed))
-
-
-def _sorted_edges(faces: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
-    """Return half-edges in the order of (low, high, half-edge), and these two ends in that order."""
-    n, bits = 3 * len(faces), max(n_vertices - 1, 1).bit_length()
-    room = max(n - 1, 1).bit_length()
-    if 2 * bits + room > 64:
-        start, end = half_edges(faces)
-        low, high = np.minimum(start, end), np.maximum(start, end)
-        order = np.lexsort((high, low)).astype(np.int32)
-        return order, low[order], high[order]
-    key = np.empty((len(faces), 3), np.uint64)
-    for first in range(0, len(faces), _FACES):
-        some = faces[first : first + _FACES]
-        for side in range(3):
-            start, end = some[:, side], some[:, (side + 1) % 3]
-            ends = np.minimum(start, end).astype(np.uint64)
-            ends <<= np.uint64(bits)
-            ends |= np.maximum(start, end).astype(np.uint64)
-            np.left_shift(ends, np.uint64(room), out=key[first : first + _FACES, side])
-    ends = key.reshape(-1)
-    order = order_of_packed(ends, room)
-    low, high = np.empty((2, n), np.int32)
-    np.right_shift(ends, np.uint64(bits), out=low, casting="unsafe")
-    np.bitwise_and(ends, np.uint64((1 << bits) - 1), out=high, casting="unsafe")
-    return order, low, high
+    start, end = half_edges(faces)
+    bits = max(n_vertices - 1, 1).bit_length()
+    key = np.minimum(start, end).astype(np.uint64) << np.uint64(bits)
+    key |= np.maximum(start, end).astype(np.uint64)
+    key, order = sorted_with_order(key, 2 * bits)
+    first = np.flatnonzero(distinct(key)).astype(np.int32)
+    size = np.diff(np.append(first, np.int32(len(order))))
+    low, high = (ends.astype(np.int32) for ends in np.divmod(key[first], np.uint64(1 << bits)))
+    return Edges(faces, order, first, size, low, high)
 
 
 def opposite(edges: Edges, n_half: int) -> Ints:
@@ -124,9 +96,8 @@ def opposite(edges: Edges, n_half: int) -> Ints:
 def surrounded_vertices(edges: Edges, n_vertices: int) -> Bools:
     """Return which vertices have two faces, wound alike, at all their edges."""
     whole = np.ones(n_vertices, bool)
-    if not edges.closed:
-        wrong = (edges.size != 2) | ~edges.balanced
-        whole[edges.low[wrong]] = whole[edges.high[wrong]] = False
+    wrong = (edges.size != 2) | ~edges.balanced
+    whole[edges.low[wrong]] = whole[edges.high[wrong]] = False
     return whole
 
 
@@ -200,8 +171,6 @@ def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
 
 def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:
     """Return the turns at the edges of four, six and so on faces that are balanced; None where there are none."""
-    if edges.closed:
-        return None
     many = np.flatnonzero((edges.size > 2) & edges.balanced)
     return _around(vertices, faces, edges, many) if len(many) else None
 
@@ -258,7 +227,6 @@ def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
 
 WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex
-_FEW = 500  # points whose pairs are all looked at in less time than a tree takes to load
 _CROWD = 30  # points within reach of a vertex, itself too: more means points that lie everywhere, not a seam
 
 
@@ -276,7 +244,7 @@ class Seams:
     reach: Floats
 
 
-def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
+def join(vertices: Floats, faces: Ints, loose: Ints, tick: Tick) -> Seams:
     """Join the vertices `loose` (those of open edges).
 
     Two are joined where they are nearer than a tenth of the shortest edge at either, and than 1e-5 of the diagonal of
@@ -302,7 +270,7 @@ def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
         return np.minimum(NARROW * short, np.maximum(WELD * size, step))
 
     reach = reaches(np.zeros(len(boxes[0]), np.int64))
-    pairs, distance = _near(vertices[points], reach)
+    pairs, distance = _near(vertices[points], reach, tick)
     while True:
         reach = reaches(components(len(boxes[0]), mine[pairs[:, 0]], mine[pairs[:, 1]]))
         fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
@@ -336,36 +304,18 @@ def _shortest_edges(vertices: Floats, faces: Ints, points: Ints) -> Floats:
     return short[points]
 
 
-def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
-    """Return pairs of points within both their reaches, and their distances.
-
-    Points of like reach are searched together, so that a coarse shell does not make a fine one a crowd.
-    """
-    near = [np.empty((0, 2), np.int64)]
-    level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
-    for size in np.unique(level):
-        some = np.flatnonzero(level >= size)
-        pairs = some[_within(points[some], float(4.0**size))]
-        near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
-    pairs = np.concatenate(near)
+def _near(points: Floats, reach: Floats, tick: Tick) -> tuple[Ints, Floats]:
+    """Return pairs of points within both their reaches, and their distances; none of a crowd."""
+    half = reach[:, None] / 2
+    try:
+        pairs = box_pairs(points - half, points + half, tick)
+    except TooMany:
+        pairs = np.empty((0, 2), np.int64)
     distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
+    if len(points) + 2 * np.count_nonzero(fits) > _CROWD * len(points):
+        fits[:] = False
     return pairs[fits], distance[fits]
-
-
-def _within(points: Floats, reach: float) -> Ints:
-    """Return pairs (k, 2) of points no farther from each other than `reach`; none of a crowd."""
-    n = len(points)
-    if n <= _FEW:
-        pairs = np.stack(np.triu_indices(n, 1), axis=1)
-        pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
-        return pairs if n + 2 * len(pairs) <= _CROWD * n else pairs[:0]
-    from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
-
-    tree = cKDTree(points)
-    if tree.count_neighbors(tree, reach) > _CROWD * n:
-        return np.empty((0, 2), np.int64)
-    return tree.query_pairs(reach, output_type="ndarray")
 
 
 def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
@@ -418,9 +368,7 @@ def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: Floats) -> Bools
 def closed_shells(edges: Edges, shells: Ints, n: int) -> Bools:
     """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
     inside = np.ones(n, bool)
-    if not edges.closed:
-        wrong = np.repeat(~edges.balanced, edges.size)
-        inside[shells[edges.order[wrong] // 3]] = False
+    inside[shells[edges.order[np.repeat(~edges.balanced, edges.size)] // 3]] = False
     return inside
 
 
@@ -527,8 +475,8 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     edges = edges_of(faces, len(vertices))
     tick()
     stored, opened = faces, None
-    if not edges.closed and (edges.size == 1).any():
-        faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges)
+    if (edges.size == 1).any():
+        faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges, tick)
         tick()
     areas, turns = area_vectors(vertices, faces), turns_of(vertices, faces, edges)
     tick()
@@ -565,7 +513,7 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
         closed,
         pinched,
         twice,
-        np.empty(0, int) if edges.closed else np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced),
+        np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced),
     )
 
 
@@ -580,11 +528,13 @@ def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
     return replace(mesh, vertices=mesh.vertices[used], faces=place[mesh.faces]), n
 
 
-def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
+def _welded(
+    vertices: Floats, faces: Ints, kept: Ints, edges: Edges, tick: Tick
+) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
     """Return the faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
 
     open_ = np.flatnonzero(edges.size == 1)
-    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
+    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])), tick)
     joined, stored, whole = seams.joined, seams.stored, seams.whole
     if not whole.all():
         joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]

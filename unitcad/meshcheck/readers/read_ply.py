@@ -42,10 +42,6 @@ class _Element:
     count: int
     properties: list[tuple[str, str, str]]
 
-    @property
-    def lists(self) -> bool:
-        return any(length for _, length, _ in self.properties)
-
 
 def read_ply(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
     """Read a PLY file, as `readers.Reader` says."""
@@ -182,10 +178,8 @@ def _binary(
     """Return the wanted columns of each element."""
     tables: Tables = {}
     for element in elements:
-        if element.lists and not _alike(raw, at, element, order):
-            tables[element.name], at = _walk_rows(raw, at, element, order, deadline)
-        else:
-            tables[element.name], at = _records(raw, at, element, order)
+        records = _records(raw, at, element, order) or _walk_rows(raw, at, element, order, deadline)
+        tables[element.name], at = records
     if extra := len(raw) - at:
         findings.append(F006.finding(f"{counted(extra, 'byte')} after the last element", extra))
     return tables
@@ -213,32 +207,22 @@ def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | No
     return np.dtype(fields)
 
 
-def _alike(raw: bytes, at: int, element: _Element, order: str) -> bool:
-    """Return whether all records of an element have lists as long as the first one's, as far as the file goes."""
+def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[str, Column], int] | None:
+    """Return the columns of an element and their end; None if its lists differ in length, or the file is too short."""
+    if not element.count:
+        return {}, at
     layout = _layout(raw, at, element, order)
-    if layout is None or not element.count:
-        return layout is not None
-    if at + element.count * layout.itemsize > len(raw):
-        return False
+    if layout is None or at + element.count * layout.itemsize > len(raw):
+        return None
     table = np.frombuffer(raw, layout, element.count, at)
-    return all((table[name] == table[name][0]).all() for name in layout.names or () if name.startswith("#"))
-
-
-def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[str, Column], int]:
-    """Return the columns of an element whose records are alike, and their end."""
-    layout = _layout(raw, at, element, order) if element.count else np.dtype([])
-    size = layout.itemsize if layout is not None else 0
-    if layout is None or at + size * element.count > len(raw):
-        raise _short(element, (len(raw) - at) // size if size else 0)
+    if any((table[name] != table[name][0]).any() for name in layout.names or () if name.startswith("#")):
+        return None
     columns: dict[str, Column] = {}
-    if size and element.count:
-        table = np.frombuffer(raw, layout, element.count, at)
-        for i, (name, length, _) in enumerate(element.properties):
-            if name in _WANTED.get(element.name, ()):
-                values = table[f"{i} {name}"]
-                sizes = np.full(element.count, values.shape[1]) if length else None
-                columns[name] = (sizes, values.reshape(-1))
-    return columns, at + size * element.count
+    for i, (name, length, _) in enumerate(element.properties):
+        if name in _WANTED.get(element.name, ()):
+            values = table[f"{i} {name}"]
+            columns[name] = (np.full(element.count, values.shape[1]) if length else None, values.reshape(-1))
+    return columns, at + element.count * layout.itemsize
 
 
 def _walk_rows(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> tuple[dict[str, Column], int]:

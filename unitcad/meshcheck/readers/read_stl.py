@@ -15,7 +15,7 @@ from unitcad.geometry.arrays import Floats
 from unitcad.meshcheck.findings import SHOWN, Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.readers import rows
-from unitcad.meshcheck.readers.rows import NUMBER
+from unitcad.meshcheck.readers.rows import NOT_FINITE_BYTES, NUMBER
 from unitcad.meshcheck.rules.f_file import (
     F001,
     F002,
@@ -40,7 +40,6 @@ _TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endface
 _WORDS = {0: b"facet", 1: b"normal", 5: b"outer", 6: b"loop", 7: b"vertex", 11: b"vertex", 15: b"vertex"}
 _WORDS |= {19: b"endloop", 20: b"endfacet"}
 _NUMBERS = [i for i in range(_TOKENS) if i not in _WORDS]
-_NOT_FINITE = re.compile(rows.NOT_FINITE.encode(), re.IGNORECASE)
 _PRINTABLE = bytes(b for b in range(256) if b in b"\t\n\v\f\r" or (b >= 32 and b != 127))
 _BLOCK = 8_000_000
 
@@ -231,7 +230,7 @@ def _slow_numbers(texts: list[bytes], state: _Text) -> Floats:
     for i, text in enumerate(texts):
         if NUMBER.fullmatch(text):
             values[i] = float(text)
-        elif _NOT_FINITE.fullmatch(text):
+        elif NOT_FINITE_BYTES.fullmatch(text):
             values[i] = np.nan
         else:
             state.findings.append(not_a_number(text, [Location(face=state.facets + i)]))
@@ -254,7 +253,7 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> Non
         elif (
             word != wanted[0]
             if wanted
-            else word in _KEYWORDS or not (NUMBER.fullmatch(word) or _NOT_FINITE.fullmatch(word))
+            else word in _KEYWORDS or not (NUMBER.fullmatch(word) or NOT_FINITE_BYTES.fullmatch(word))
         ):
             fixed = wanted or word in _KEYWORDS
             if match.end() == len(raw) and (not fixed or any(whole.startswith(word) for whole in wanted)):

@@ -44,7 +44,7 @@ NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 _MICROSOFT = r"1\.#(?:(?:ind|inf|qnan|snan)\w*(?:[+-]\d+)?|(?:io|j|qo|r)\d*)"  # rounded, INF is J and QNAN is R
 NOT_FINITE = rf"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|{_MICROSOFT})"
 """How programs write a number that is not finite, in either case."""
-_NOT_FINITE = re.compile(NOT_FINITE.encode(), re.IGNORECASE)
+NOT_FINITE_BYTES = re.compile(NOT_FINITE.encode(), re.IGNORECASE)
 _WITH_HASH = re.compile(rf"(?<![^\s+-]){_MICROSOFT}(?!\S)".encode(), re.IGNORECASE)
 _INTEGER = re.compile(rb"[+-]?\d{1,18}")
 _WORD = re.compile(rb"\S+")
@@ -243,7 +243,7 @@ def _slowly(block: Ints, line: int, integers: bool) -> Floats:
     for match in _WORD.finditer(text):
         word = match.group()
         finite = (_INTEGER if integers else NUMBER).fullmatch(word)
-        if not finite and (integers or not _NOT_FINITE.fullmatch(word)):
+        if not finite and (integers or not NOT_FINITE_BYTES.fullmatch(word)):
             place = [Location(line=line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v")))]
             if integers:
                 shown = word[:30].decode("utf-8", "replace")

@@ -34,11 +34,8 @@ def coordinate(text: str, model: Model, line: int) -> float:
     return 0.0
 
 
-def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> Floats:
-    """Return the transform (4, 3) of an attribute's text; the identity, with a finding of `model`, where it is none.
-
-    `regular`: linear parts that are known to be sound; this one is added.
-    """
+def transform(text: str | None, model: Model) -> Floats:
+    """Return the transform (4, 3) of an attribute's text; the identity, with a finding of `model`, if it is none."""
     identity = np.vstack([np.eye(3), np.zeros(3)])
     if text is None:
         return identity
@@ -48,15 +45,12 @@ def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> 
         if not (np.abs(matrix) <= LARGEST).all():
             model.add(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
             return identity
-        if (linear := tuple(parts[:9])) not in regular:  # most items of a build differ by their shift only
-            det = float(np.linalg.det(matrix[:3]))
-            scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
-            if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
-                model.add(P013, "a transform has determinant zero")
-            elif det < 0:
-                model.add(P015, "a transform mirrors")
-            else:
-                regular.add(linear)
+        det = float(np.linalg.det(matrix[:3]))
+        scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
+        if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
+            model.add(P013, "a transform has determinant zero")
+        elif det < 0:
+            model.add(P015, "a transform mirrors")
         return matrix
     rule = P013 if len(parts) == 12 and any(_NOT_FINITE.fullmatch(part) for part in parts) else P017
     model.add(rule, f'transform="{text[:60]}" is not twelve numbers')
@@ -99,7 +93,6 @@ class _Reader:
         self.rank = self.uses = 0
         self.resource: Resource | None = None
         self.names: set[str] = set()
-        self.regular: set[tuple[str, ...]] = set()
         self.leaf, self.leaf_names = "", list[str]()
         self.texts: list[str] = []
         self.lines: list[int] = []
@@ -317,7 +310,7 @@ class _Reader:
         if uuid is not None and not schema.uuid(uuid):
             self.model.add(P017, f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{schema.PRODUCTION} path", "")
-        matrix = transform(attributes.get("transform"), self.model, self.regular)
+        matrix = transform(attributes.get("transform"), self.model)
         return Use(
             int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
         )

@@ -157,8 +157,6 @@ def _open_edges(topology: Topology) -> Iterator[Finding]:
 
 def _many_faces(topology: Topology) -> Iterator[Finding]:
     edges = topology.edges
-    if edges.closed:
-        return
     for rule, odd, word in ((T002, 1, "odd"), (T003, 0, "even")):
         which = np.flatnonzero((edges.size > 2) & (edges.size % 2 == odd))
         if len(which):
