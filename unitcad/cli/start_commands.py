@@ -78,7 +78,7 @@ def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
         "materials": lambda: _values(catalogue.materials()),
         "motors": lambda: _values(catalogue.motors()),
         "printers": lambda: _values(catalogue.printers()),
-        "rules": lambda: {code: rule.title for code, rule in rules().items()},
+        "rules": lambda: {code: f"{rule.severity}: {rule.title}" for code, rule in rules().items()},
     }
 
 
