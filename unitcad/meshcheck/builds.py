@@ -358,9 +358,6 @@ def check_printability(instances: Sequence[Instance], printer: Printer, deadline
 
 def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:
     """Return the findings of an instance that lies elsewhere on the bed."""
-    if not by.any():
-        yield from findings
-        return
     for item in findings:
         places = (replace(place, xyz=point(place.xyz + by)) if place.xyz else place for place in item.locations)
         yield replace(item, locations=tuple(places))

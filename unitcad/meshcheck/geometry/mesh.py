@@ -12,7 +12,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
-from unitcad.geometry.arrays import Floats, Ints, by_appearance, cross, distinct, order_of_packed
+from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
 
 _NO_INDEX = np.empty(0, np.int64)
 
@@ -50,6 +50,8 @@ LARGEST = float(np.finfo(np.float32).max)
 
 SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 """Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
+
+_BLOCK = 1 << 15  # points that stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,5 +156,16 @@ def solid_of(vertices: Floats, faces: Ints) -> Manifold:
 
 def area_vectors(vertices: Floats, faces: Ints) -> Floats:
     """Return twice the area of each face along its normal (right-hand rule), (m, 3) mm2."""
-    origin = vertices.take(faces[:, 0], axis=0)
-    return cross(vertices.take(faces[:, 1], axis=0) - origin, vertices.take(faces[:, 2], axis=0) - origin)
+    columns, areas = np.ascontiguousarray(vertices.T), np.empty((len(faces), 3))
+    for start in range(0, len(faces), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        one, two, three = (corner.astype(np.intp) for corner in faces[block].T)
+        first, second = [], []
+        for column in columns:
+            origin = column.take(one)
+            first.append(column.take(two) - origin)
+            second.append(column.take(three) - origin)
+        for axis in range(3):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            np.subtract(first[i] * second[j], first[j] * second[i], out=areas[block, axis])
+    return areas

@@ -135,6 +135,7 @@ def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
 
 
 _SOUND = 1e-9  # of the squared longest side: faces with less area have no direction worth adding to a mean
+_FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _FACING = 0.01  # cosine to the mean direction
 
 
@@ -145,32 +146,41 @@ def height_fields(columns: Floats, corners: Ints, areas: Floats, whole: Bools) -
     normal of the vertex the faces of its star face one way and go round it once. Rounding moves a face's turn by 2e-5
     at most, and turns are whole.
     """
-    n = columns.shape[1]
-    sides = _sides_of(columns, corners)
-    size = np.sqrt(_dot(areas, areas))
-    longest = np.maximum.reduce([_dot(side, side) for side in sides])
-    share = 1 / np.where(size > _SOUND * longest, size, np.inf)
-    along = np.zeros((3, n))
-    for k, corner in enumerate(corners):  # a normal counts by the angle of its face there, however it is cut into faces
-        weight = share * np.arctan2(size, -_dot(sides[k], sides[k - 1]))
-        for axis in range(3):
-            along[axis] += np.bincount(corner, weight * areas[axis], n)
-    along /= np.maximum(np.sqrt(_dot(along, along)), 1e-300)
+    n, m = columns.shape[1], corners.shape[1]
+    blocks = [slice(start, start + _FACES) for start in range(0, m, _FACES)]
+    share, angle, steep = np.empty(m), np.empty((3, m)), np.empty((3, m), bool)
+    for block in blocks:
+        here = list(areas[:, block])
+        size = np.sqrt(_dot(here, here))
+        sides = _sides_of(columns, corners[:, block])
+        longest = np.maximum.reduce([_dot(side, side) for side in sides])
+        share[block] = 1 / np.where(size > _SOUND * longest, size, np.inf)
+        for k in range(3):  # a normal counts by the angle of its face there, however many faces a fan is cut into
+            np.arctan2(size, -_dot(sides[k], sides[k - 1]), out=angle[k, block])
+    angle *= share
+    along = [np.add.reduce([np.bincount(corners[k], angle[k] * area, n) for k in range(3)]) for area in areas]
+    length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
+    along = [part / length for part in along]
+    for block in blocks:
+        sides, here = _sides_of(columns, corners[:, block]), list(areas[:, block])
+        for k, corner in enumerate(corners[:, block]):
+            up = [part.take(corner) for part in along]
+            double = _dot(here, up)
+            flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
+            steep[k, block] = double * share[block] <= _FACING
+            np.arctan2(double, flat, out=angle[k, block])
     turns, seen = np.zeros(n), whole.copy()
     for k, corner in enumerate(corners):
-        up = along.take(corner, axis=1)
-        double = _dot(areas, up)
-        flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
-        seen[corner[double * share <= _FACING]] = False
-        turns += np.bincount(corner, np.arctan2(double, flat), n)
+        seen[corner[steep[k]]] = False
+        turns += np.bincount(corner, angle[k], n)
     return seen & (np.abs(turns - 2 * np.pi) < 0.1)
 
 
-def _sides_of(columns: Floats, ids: Ints) -> list[Floats]:
-    """Return the sides of faces from each corner to the next: (axis, n) each."""
-    at = [columns.take(corner, axis=1) for corner in ids]
-    return [at[(k + 1) % 3] - at[k] for k in range(3)]
+def _sides_of(columns: Floats, ids: Ints) -> list[list[Floats]]:
+    """Return the sides of faces from each corner to the next, by axis."""
+    at = [[column.take(corner, mode="clip") for column in columns] for corner in ids.astype(np.intp)]
+    return [[at[(k + 1) % 3][axis] - at[k][axis] for axis in range(3)] for k in range(3)]
 
 
-def _dot(a: Floats, b: Floats) -> Floats:
+def _dot(a: list[Floats], b: list[Floats]) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

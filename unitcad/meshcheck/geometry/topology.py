@@ -131,10 +131,7 @@ def _fans(faces: Ints, across: Ints, asked: Bools) -> Ints:
         np.minimum(label, label.take(turn), out=label)
         if i < rounds - 1:
             turn = turn.take(turn)
-    fresh = label == places
-    if np.count_nonzero(fresh) == np.count_nonzero(valence):
-        return np.minimum(valence, 1)
-    fans = np.bincount(start[fresh], minlength=len(asked))
+    fans = np.bincount(start[label == places], minlength=len(asked))
     fans[~asked] = 0
     return fans
 
