@@ -55,16 +55,16 @@ NEWLINE, HASH, SLASH, SPACE = 10, 35, 47, 32
 JOINED = 11  # a vertical tab stands where a line was continued
 
 
-def _table_of(characters: bytes) -> Bools:
+def table_of(characters: bytes) -> Bools:
     """Return which of the 256 bytes are among `characters`."""
     table = np.zeros(256, bool)
     table[list(characters)] = True
     return table
 
 
-BLANK = _table_of(b" \t\n\v\f\r")
-_IN_NUMBERS = _table_of(b"0123456789+-.eEnNaAiIfFtTyY \t\n\v\f\r")
-_IN_INTEGERS = _table_of(b"0123456789+- \t\n\v\f\r")
+BLANK = table_of(b" \t\n\v\f\r")
+_IN_NUMBERS = table_of(b"0123456789+-.eEnNaAiIfFtTyY \t\n\v\f\r")
+_IN_INTEGERS = table_of(b"0123456789+- \t\n\v\f\r")
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,13 +224,18 @@ def joined(parts: list[Rows]) -> Rows:
 
 
 def _parse(block: Ints, count: int, integers: bool) -> Floats | None:
-    """Return the numbers of `count` words; None where one may be none."""
+    """Return the numbers where all words of the block are some; None where one may be none."""
     if not (_IN_INTEGERS if integers else _IN_NUMBERS)[block].all():
         return None
+    return numbers_of(block.tobytes(), count, integers=integers)
+
+
+def numbers_of(words: bytes, count: int, *, integers: bool) -> Floats | Ints | None:
+    """Return the numbers of `count` words, all of characters that numbers have; None where one word is none."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            values = np.fromstring(block.tobytes(), np.int64 if integers else np.float64, sep=" ")
+            values = np.fromstring(words, np.int64 if integers else np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
             return None
     return values if len(values) == count else None  # "1-2" is two numbers to numpy

@@ -1,11 +1,12 @@
-"""A 3MF model part, read element by element; the numbers of vertices and triangles become arrays in batches."""
+"""A 3MF model part, read element by element; vertices and triangles in uniform blocks are read by numpy."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Location
 from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers import threemf_schema as schema
-from unitcad.meshcheck.readers.rows import NOT_FINITE
+from unitcad.meshcheck.readers.rows import NEWLINE, NOT_FINITE, SPACE, numbers_of, table_of
 from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, stream
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.f_file import F004, F011, Limits, Unreadable, not_a_number
@@ -57,9 +58,181 @@ def transform(text: str | None, model: Model) -> Floats:
     return identity
 
 
+_BLOCK = 1 << 18
+_OPEN = re.compile(rb"<(vertices|triangles)>")
+_LONGEST_TAG = len(b"<triangles>")
+_HEAD = {name: re.compile(rb"[ \t\r\n]*<" + name + rb'[ \t\r\n]+(\w+)="') for name in (b"vertex", b"triangle")}
+_WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
+_AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
+_ELEMENTS = {b"vertices": b"vertex", b"triangles": b"triangle"}
+_NAMES = {b"vertex": (b"x", b"y", b"z"), b"triangle": (b"v1", b"v2", b"v3", b"p1", b"p2", b"p3", b"pid")}
+"""Attributes, of which each element needs the first three."""
+_SHORTEST = 1500  # bytes; a shorter block costs the parser less
+_LONGEST_GAP = 200  # bytes between two numbers
+_MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
+_QUOTE = ord('"')
+
+
+_DIGITS = table_of(b"0123456789")
+_IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
+
+
+@dataclass(frozen=True)
+class UniformBlock:
+    """The elements of a uniform block.
+
+    columns: the numbers (n,) of each attribute by its name; lines: the line (n,) of each element, 0 for the one on
+    which the block begins; line_ends: how many there are in the block.
+    """
+
+    columns: dict[str, Floats | Ints]
+    lines: Ints
+    line_ends: int
+
+
+class Reader(Protocol):
+    """A reader of the elements that the parser reports."""
+
+    def inside(self, fed: int) -> tuple[int, str]:
+        """Return the number of open elements and the name of the innermost one if it belongs to the core.
+
+        The name is empty while the parser holds back some of the `fed` bytes.
+        """
+        ...
+
+    def take(self, name: str, found: UniformBlock) -> bool:
+        """Keep the elements of a list; return False if they have to be read one by one."""
+        ...
+
+
+def rest_for_parser(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
+    """Yield what the parser has to read of a part. It must have parsed each piece before it asks for the next one."""
+    left, held, at, fed, open_list = iter(chunks), b"", 0, 0, b""  # `at` bytes of `held` are done
+    while True:
+        if not open_list:
+            found = _OPEN.search(held, at)
+            if found is None:
+                last = held.rfind(b"<", max(len(held) - _LONGEST_TAG, at))  # of a tag that may go on in the next chunk
+                cut = len(held) if last < 0 else last
+            else:
+                cut = found.start()
+            if cut > at:
+                yield held[at:cut]
+                fed, at = fed + cut - at, cut
+            if found is None:
+                chunk = next(left, b"")
+                if not chunk:
+                    break
+                held, at = held[at:] + chunk, 0
+                continue
+            depth, _ = reader.inside(fed)
+            yield found.group()
+            fed, at = fed + len(found.group()), found.end()
+            if reader.inside(fed) == (depth + 1, found.group(1).decode()):
+                open_list = found.group(1)
+            elif at < len(held):  # in a comment, for example: one full of tags would take long, tag by tag
+                yield held[at:]
+                fed, held, at = fed + len(held) - at, b"", 0
+            continue
+        while len(held) - at < _BLOCK and held.find(b"</", at) < 0 and (chunk := next(left, b"")):
+            held, at = held[at:] + chunk, 0
+        end = held.find(b"</", at, at + _BLOCK)
+        cut = held.rfind(b"/>", at, end if end >= 0 else at + _BLOCK) + 2
+        if cut < 2:
+            open_list = b""
+            continue
+        block, at = held[at:cut], cut
+        uniform = read_uniform(block, _ELEMENTS[open_list]) if len(block) >= _SHORTEST else None
+        if uniform is not None and reader.take(open_list.decode(), uniform):
+            block = b"\n" * uniform.line_ends
+            if block:
+                yield block
+            fed += len(block)
+            continue
+        yield block
+        fed += len(block)
+        # A comment or a section of characters may hold what looks like elements.
+        if b"<!" in block or b"<?" in block or reader.inside(fed)[1] != open_list.decode():
+            open_list = b""
+    if at < len(held):
+        yield held[at:]
+
+
+def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
+    """Return the elements of a block, `vertex` or `triangle`, or None if the block is not uniform.
+
+    In a uniform block all text between the numbers repeats, and each attribute is one of the core's.
+    """
+    if b"\r" in block and block.count(b"\r") != block.count(b"\r\n"):
+        return None
+    head = _HEAD[element].match(block)
+    if head is None:
+        return None
+    names = [head.group(1)]
+    at = head.end()
+    while within := _WITHIN.match(block, block.find(b'"', at)):
+        names.append(within.group(1))
+        at = within.end()
+    known = _NAMES[element]
+    if len(set(names)) < len(names) or not set(known[:3]) <= set(names) <= set(known):
+        return None
+    text = np.frombuffer(block, np.uint8)
+    quotes = np.flatnonzero(text == _QUOTE)
+    each = 2 * len(names)
+    if len(quotes) % each or _AFTER.fullmatch(block, int(quotes[-1])) is None:
+        return None
+    quotes = quotes.reshape(-1, each)
+    begin, end = quotes[:, ::2] + 1, quotes[:, 1::2]
+    if not _same_between(text, quotes, block, head.group()):
+        return None
+    numbers = _numbers(text, begin, end, whole=element == b"triangle")
+    if numbers is None:
+        return None
+    line_ends = np.flatnonzero(text == NEWLINE)
+    first = block.index(b"<")
+    starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
+    lines = np.searchsorted(line_ends, starts)
+    return UniformBlock({name.decode(): numbers[:, i] for i, name in enumerate(names)}, lines, len(line_ends))
+
+
+def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
+    """Tell whether the text between the numbers of the first element, and after it, repeats in the others."""
+    opened, closed = quotes.ravel()[::2], quotes.ravel()[1::2]
+    width = opened[1:] - closed[:-1]
+    each = quotes.shape[1] // 2
+    for k in range(each):
+        some, gap = closed[:-1][k::each], width[k::each]
+        if not len(some):
+            continue
+        if gap[0] > _LONGEST_GAP or not (gap == gap[0]).all():
+            return False
+        pattern = text[some[0] : some[0] + gap[0] + 1]
+        if k == each - 1:
+            after = _AFTER.match(pattern.tobytes())
+            if after is None or pattern.tobytes()[after.end() :] != head.lstrip():
+                return False
+        for i, character in enumerate(pattern.tolist()):
+            if not (text[some + i] == character).all():
+                return False
+    return True
+
+
+def _numbers(text: Ints, begin: Ints, end: Ints, *, whole: bool) -> Floats | Ints | None:
+    """Return the numbers between quotes, shape as `begin`; None if one may be none."""
+    size = end - begin
+    if size.min() < 1 or (whole and size.max() > _MOST_DIGITS):
+        return None
+    marks = np.zeros(len(text) + 1, np.int8)
+    marks[begin], marks[end] = 1, -1
+    inside = np.cumsum(marks[:-1], dtype=np.int8).view(bool)
+    if not (_DIGITS if whole else _IN_NUMBERS)[text[inside]].all():
+        return None
+    values = numbers_of(np.where(inside, text, np.uint8(SPACE)).tobytes(), begin.size, integers=whole)
+    return None if values is None else values.reshape(begin.shape)
+
+
 _BATCH = 50_000
 _DEPTH = 60
-_DIGITS = 10  # 2^31 has as many
 
 
 @dataclass
@@ -72,10 +245,9 @@ class _Open:
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
     told: bool = False
-    leaf: str = ""  # the name of its elements if they are read in batches
 
 
-# What programs write where a name is missing. Other unprefixed names pass: consumers ignore them (core, 3.4.1).
+# Text that programs write for a missing name. Other unprefixed names pass: consumers ignore them (core, 3.4.1).
 _PLACEHOLDERS = {"undefined", "null"}
 
 
@@ -93,22 +265,51 @@ class _Reader:
         self.rank = self.uses = 0
         self.resource: Resource | None = None
         self.names: set[str] = set()
-        self.leaf, self.leaf_names = "", list[str]()
-        self.texts: list[str] = []
+        self.numbers: list[str] = []
         self.lines: list[int] = []
-        self.line = 0
         self.vertices: list[Floats] = []
         self.n_vertices = 0
         self.beyond = False
+        self.triangles: list[tuple[int, ...]] = []
         self.rows: list[Ints] = []
 
     def _where(self) -> Location:
         inside = self.resource.id if isinstance(self.resource, Object) else None
-        line = self.line or self.parser.CurrentLineNumber
-        return Location(line=line, object=None if inside is None else str(inside))
+        return Location(line=self.parser.CurrentLineNumber, object=None if inside is None else str(inside))
 
     def namespace(self, prefix: str | None, uri: str) -> None:
         self.model.namespaces[prefix or ""] = uri
+
+    def inside(self, fed: int) -> tuple[int, str]:
+        """Return the number of open elements and the name of the innermost one if it belongs to the core.
+
+        The name is empty while the parser holds back some of the `fed` bytes.
+        """
+        last = self.stack[-1]
+        whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == schema.CORE
+        return len(self.stack) + self.skip, last.name if whole else ""
+
+    def take(self, name: str, found: UniformBlock) -> bool:
+        """Keep the elements of a uniform block; return False if one of them needs a finding."""
+        if name == "vertices":
+            values = np.stack([found.columns[axis] for axis in _XYZ], axis=1)
+            if not (np.abs(values) <= LARGEST).all():
+                return False
+            self._flush_vertices()
+            self._keep_vertices(values)
+            return True
+        if "pid" in found.columns and not found.columns["pid"].all():
+            return False
+        self._flush_triangles()
+        rows = np.full((len(found.lines), LINE + 1), -1)
+        for i, column in enumerate(_COLUMNS):
+            if column in found.columns:
+                rows[:, i] = found.columns[column]
+        rows[:, LINE] = self.parser.CurrentLineNumber + found.lines
+        self.rows.append(rows)
+        self.rank += len(rows)
+        self._count_faces(len(rows))
+        return True
 
     def start(self, name: str, flat: list[str]) -> None:
         if self.skip:
@@ -117,10 +318,13 @@ class _Reader:
                 raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
             return
         above = self.stack[-1]
-        if name == above.leaf:
-            self._leaf(name, flat)
+        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
+            self.numbers += flat[1::2]
+            self.lines.append(self.parser.CurrentLineNumber)
+            self.stack.append(_LEAF)
+            if len(self.numbers) >= 3 * _BATCH:
+                self._flush_vertices()
             return
-        self.flush()
         if len(self.stack) > _DEPTH:
             raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
         space, _, local = name.rpartition(" ")
@@ -139,24 +343,14 @@ class _Reader:
             self.skip = 1
             return
         good = self._attributes(local, rules, attributes)
-        self.stack.append(_Open(space, local, rules, leaf=_LISTS.get(name, "")))
+        self.stack.append(_Open(space, local, rules))
         self.rank += 1
         if good:
             self._take(space, local, attributes)
 
-    def _leaf(self, name: str, flat: list[str]) -> None:
-        """Let a vertex or a triangle wait for others with the same attributes."""
-        names = flat[::2]
-        if names != self.leaf_names or name != self.leaf or len(self.lines) >= _BATCH:
-            self.flush()
-            self.leaf, self.leaf_names = name, names
-        self.texts += flat[1::2]
-        self.lines.append(self.parser.CurrentLineNumber)
-        self.stack.append(_LEAVES[name])
-
     def text_inside(self, text: str) -> None:
         """Find fault with text in an element that holds none."""
-        above = self.stack[-1] if self.stack[-1].rules else self.stack[-2]
+        above = self.stack[-2] if self.stack[-1] is _LEAF else self.stack[-1]
         if not self.skip and not above.told and above.name not in ("", "metadata") and text.strip(" \t\r\n"):
             above.told = True
             self.model.add_lenient(P017, f"text inside <{above.name}>")
@@ -166,13 +360,16 @@ class _Reader:
             self.skip -= 1
             return
         done = self.stack.pop()
-        if done.rules is None:
+        if done is _LEAF or done.rules is None:
             return
-        self.flush()
         for child, least, _most in done.rules.children:
             if done.counts.get(child, 0) < least:
                 self.model.add(P017, f"<{done.name}> lacks <{child}>")
-        if done.space == schema.CORE and done.name == "mesh":
+        if done.space == schema.CORE and done.name == "vertices":
+            self._flush_vertices()
+        elif done.space == schema.CORE and done.name == "triangles":
+            self._flush_triangles()
+        elif done.space == schema.CORE and done.name == "mesh":
             self._close_mesh()
         elif done.name == "object" and isinstance(self.resource, Object):
             self._close_object(self.resource)
@@ -182,8 +379,8 @@ class _Reader:
     def _child(self, space: str, local: str, rules: schema.ElementSchema | None) -> None:
         """Check that this child may stand here, and in this order."""
         parent = self.stack[-1]
-        if parent.name and parent.rules is None:
-            self.model.add(P017, f"<{local}> inside <{parent.name}>")
+        if parent is _LEAF:
+            self.model.add(P017, f"<{local}> inside <vertex>")
             return
         if not parent.name:
             if (space, local) != (schema.CORE, "model"):
@@ -291,6 +488,22 @@ class _Reader:
         kind = attributes.get("type", "model")
         self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
+    def _take_triangle(self, attributes: dict[str, str]) -> None:
+        row = tuple(int(attributes.get(name, -1)) for name in _COLUMNS)
+        self.triangles.append((*row, self.parser.CurrentLineNumber))
+        self._count_faces(1)
+        if len(self.triangles) >= _BATCH:
+            self._flush_triangles()
+
+    def _count_faces(self, number: int) -> None:
+        self.faces += number
+        if self.faces > self.limits.max_faces:
+            raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
+
+    def _take_vertex(self, attributes: dict[str, str]) -> None:
+        self.numbers += [attributes["x"], attributes["y"], attributes["z"]]
+        self.lines.append(self.parser.CurrentLineNumber)
+
     def _take_component(self, attributes: dict[str, str]) -> None:
         if isinstance(self.resource, Object):
             self.resource.components.append(self._use(attributes))
@@ -329,56 +542,35 @@ class _Reader:
         if len(self.resource.beams) > self.limits.max_faces:
             raise F011.unreadable("more beams than --max-faces")
 
-    def flush(self) -> None:
-        """Keep the vertices or triangles that wait; those that are odd are checked one by one."""
-        leaf, names, texts, lines = self.leaf, self.leaf_names, self.texts, self.lines
-        self.leaf, self.leaf_names, self.texts, self.lines = "", [], [], []
-        if not lines:
+    def _flush_vertices(self) -> None:
+        if not self.numbers:
             return
-        local, n = leaf.split()[-1], len(names)
-        needed = _XYZ if local == "vertex" else _COLUMNS
-        if not set(needed[:3]) <= set(names) <= set(needed) or (local == "triangle" and not _plain(names, texts)):
-            rules, good = schema.ELEMENTS[schema.CORE][local], list[tuple[int, dict[str, str]]]()
-            for i, self.line in enumerate(lines):
-                attributes = dict(zip(names, texts[i * n : (i + 1) * n], strict=True))
-                if self._attributes(local, rules, attributes):
-                    good.append((self.line, attributes))
-            self.line = 0
-            lines, names = [line for line, _ in good], needed
-            texts = [attributes.get(name, "-1") for _, attributes in good for name in needed]
-        if local == "vertex":
-            self._keep_vertices(names, texts, lines)
-        else:
-            self._keep_triangles(names, texts, lines)
-
-    def _keep_vertices(self, names: list[str], texts: list[str], lines: list[int]) -> None:
         try:
-            text = "".join(texts)
+            text = "".join(self.numbers)
             if not text.isascii() or "_" in text:  # which Python takes for a number's
                 raise ValueError(text[:40])
-            values = np.array(texts, dtype=np.float64)
+            values = np.array(self.numbers, dtype=np.float64)
         except ValueError:
-            n = len(names)
-            values = np.array([coordinate(text, self.model, lines[i // n]) for i, text in enumerate(texts)])
+            values = np.array([coordinate(text, self.model, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
             if not self.beyond:
-                self.model.add(V001, "a vertex is not a finite float32 number", line=lines[bad[0] // len(names)])
+                self.model.add(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
             self.beyond = True
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        self.vertices.append(values.reshape(-1, 3)[:, [names.index(axis) for axis in _XYZ]])
-        self.n_vertices += len(lines)
+        self.numbers, self.lines = [], []
+        self._keep_vertices(values.reshape(-1, 3))
+
+    def _keep_vertices(self, values: Floats) -> None:
+        self.vertices.append(values)
+        self.n_vertices += len(values)
         if self.n_vertices > 3 * self.limits.max_faces + 3:
             raise F011.unreadable("more vertices than three times --max-faces")
 
-    def _keep_triangles(self, names: list[str], texts: list[str], lines: list[int]) -> None:
-        rows = np.full((len(lines), LINE + 1), -1)
-        rows[:, [_COLUMNS.index(name) for name in names]] = np.array(texts, dtype=np.int64).reshape(-1, len(names))
-        rows[:, LINE] = lines
-        self.rows.append(rows)
-        self.faces += len(rows)
-        if self.faces > self.limits.max_faces:
-            raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
+    def _flush_triangles(self) -> None:
+        if self.triangles:
+            self.rows.append(np.array(self.triangles, dtype=np.int64))
+            self.triangles = []
 
     def _close_mesh(self) -> None:
         if isinstance(self.resource, Object):
@@ -401,36 +593,19 @@ _SHAPES = {
     schema.IMPLICIT,
 }
 _XYZ = ["x", "y", "z"]
-_COLUMNS = ["v1", "v2", "v3", "p1", "p2", "p3", "pid"]
-_LISTS = {
-    f"{schema.CORE} vertices": f"{schema.CORE} vertex",
-    f"{schema.CORE} triangles": f"{schema.CORE} triangle",
-}
-_LEAVES = {name: _Open(schema.CORE, name.split()[-1], None) for name in _LISTS.values()}
-
-
-def _plain(names: list[str], texts: list[str]) -> bool:
-    """Test whether all attributes of triangles are of their types, written in nothing but digits."""
-    digits = "".join(texts)
-    return (
-        digits.isascii()
-        and digits.isdecimal()
-        and 0 < min(map(len, texts)) <= max(map(len, texts)) < _DIGITS
-        and ("pid" not in names or all(map(int, texts[names.index("pid") :: len(names)])))
-    )
+_COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
+_LEAF = _Open(schema.CORE, "vertex", None)
+_VERTEX = f"{schema.CORE} vertex"
 
 
 def read_model(
     chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0, *, strict: bool = False
 ) -> Model:
-    """Read one model part. Schema faults are the model's findings; raises `Unreadable` where XML or a limit ends it."""
+    """Read one model part. Schema faults are the model's findings; raises `Unreadable` if XML or a limit ends it."""
     model = Model(part, strict=strict)
     reader = _Reader(model, limits, spent_faces)
     try:
-        try:
-            stream(chunks, part, reader.start, reader.end, reader.namespace, reader.parser)
-        finally:
-            reader.flush()
+        stream(rest_for_parser(chunks, reader), part, reader.start, reader.end, reader.namespace, reader.parser)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

@@ -86,8 +86,7 @@ def stream(
                 raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
             parser.Parse(chunk, False)
             seen += len(chunk)
-        chunk = b""
-        parser.Parse(chunk, True)
+        parser.Parse(b"", True)
     except expat.ExpatError as error:
         line = [Location(part=part, line=error.lineno)]
         at = parser.ErrorByteIndex - seen
