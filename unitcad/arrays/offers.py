@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -22,8 +21,8 @@ from unitcad.validation.suggestions import (
     write_changes,
 )
 
-PATIENCE_S = 10.0
-"""How long suggestions are looked for, s of processor time: one try of a large array takes a second."""
+MOST_TRIED, _LARGE = 4_000, 400
+"""Places of all tried arrays together, at most, and of one: a try of an array of so many takes a second."""
 _PITCH = "layout.pitch_mm"
 _OF_TAIL = ("fpcb.tail_length_mm", "wires.length_mm")
 _WIDEST = 16
@@ -98,11 +97,13 @@ def _otherwise(
 
 
 def _patient(judge: Judge) -> Judge:
-    """Return a judge that refuses everything once it has been asked for PATIENCE_S."""
-    end = time.process_time() + PATIENCE_S
+    """Return a judge that refuses everything once it has been asked for MOST_TRIED places."""
+    left = MOST_TRIED
 
     def judged(data: dict[str, Any]) -> object:
-        if time.process_time() > end:
+        nonlocal left
+        left -= min(max(_places(data), 1), _LARGE)
+        if left < 0:
             raise Refusal("", None, "not tried")
         return judge(data)
 
