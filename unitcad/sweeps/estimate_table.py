@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 
-from unitcad.attenuation.edge.level import range_notes, unknown
-from unitcad.attenuation.edge.measured import nominal
-from unitcad.attenuation.edge.models import edge_levels, stored
+from unitcad.attenuation.edge.level import edge_level
 from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.insensitive_keys import swept_estimate
-from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Journal, JournalEntry, Summary
 from unitcad.sweeps.result_folders import BatchOptions
-from unitcad.sweeps.results import columns_of, write_results, write_timings
-from unitcad.sweeps.run import Watch, batch_head, count_entry, count_variants
+from unitcad.sweeps.run import Watch, batch_head, count_entry, count_variants, finish
 from unitcad.sweeps.sweep import Sweep
 
 
@@ -42,11 +36,7 @@ def write_estimates(
                 journal.add(entry)
             count_entry(summary, entry.status, lambda entry=entry: entry)
             watch(summary, tasks.VariantOutcome(index, entry.status, reason=entry.reason))
-        found = swept_estimate(sweep, count)
-        summary.warnings += insensitive_warnings(found)
-        write_results(out, columns_of(sweep, journal), journal.entries, head, found, options.tables, count)
-        summary.seconds = round(time.perf_counter() - start, 3)
-        write_timings(out, summary, 1)
+        finish(sweep, journal, head, options, summary, start, 1)
     watch(summary, None)
     return summary
 
@@ -69,10 +59,5 @@ def levels(spec: Spec) -> dict[str, float | None]:
     Raises Refusal as `estimate_spec`.
     """
     asked, fit = estimate_input(spec), fit_of(spec)
-    blank = bool(unknown(asked) or range_notes(asked))
-    found: dict[str, float | None] = {}
-    for model in closed_forms(spec.estimate.models):
-        constants = fit.constants(model) if fit else stored(asked.moduli)[model]
-        level = math.nan if blank else float(edge_levels(nominal(asked), model, constants)[0])
-        found[f"edge_{model}"] = float(f"{level:.6g}") if math.isfinite(level) else None
-    return found
+    found = {model: edge_level(asked, model, fit)["value"] for model in closed_forms(spec.estimate.models)}
+    return {f"edge_{model}": level and float(f"{level:.6g}") for model, level in found.items()}

@@ -57,8 +57,8 @@ def run(
 ) -> Summary:
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
-    `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers don't share this disk:
-    results come back as messages. Variants that an earlier run in `out` finished are not made again. Raises
+    `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers may be on other
+    machines: results go by a store. Variants that an earlier run in `out` finished are not made again. Raises
     UnitcadError if nothing can be run; the summary has the outcome of each variant.
     """
     head = batch_head(sweep, check_outputs(options.only), options)
@@ -84,11 +84,7 @@ def run(
             clear_leftovers(out)
         if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
             make_folders(out, journal.entries(), destination.store, cache)
-        found = swept_estimate(sweep, count) if "estimate" in head.outputs else None
-        summary.warnings += insensitive_warnings(found)
-        write_results(out, columns_of(sweep, journal), journal.entries, head, found, options.tables, count)
-        summary.seconds = round(time.perf_counter() - start, 3)
-        write_timings(out, summary, workers)
+        finish(sweep, journal, head, options, summary, start, workers)
         watch(summary, None)
     except OSError as error:
         raise _ended(tasks.failure(0, error), out, summary) from error
@@ -100,6 +96,18 @@ def run(
         journal.close()
         cache.close()
     return summary
+
+
+def finish(
+    sweep: Sweep, journal: Journal, head: BatchHead, options: BatchOptions, summary: Summary, start: float, workers: int
+) -> None:
+    """Write the tables of a batch that is whole in its journal, and its times since `start`. Raises OSError."""
+    count = summary.variants
+    found = swept_estimate(sweep, count) if "estimate" in head.outputs else None
+    summary.warnings += insensitive_warnings(found)
+    write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found, options.tables, count)
+    summary.seconds = round(time.perf_counter() - start, 3)
+    write_timings(journal.out, summary, workers)
 
 
 def trim(options: BatchOptions) -> None:

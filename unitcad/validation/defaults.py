@@ -173,9 +173,13 @@ def _moulds(raw: RawSpec, design: Design) -> MouldsTable:
     if given["shrinkage_percent"] is None:
         known = catalogue.materials(raw.materials)
         lengths["shrinkage_percent"] = max(float(known[one.material].shrinkage_percent or 0.0) for one in raw.layers)
-    for name in {"slot_height_mm", *_BASE} & lengths.keys():
-        lengths[name] = round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
-    return convert({**given, **lengths}, MouldsTable, "moulds")
+    heights = {
+        name: round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
+        for name in ("slot_height_mm", *_BASE)
+        if name in lengths
+    }
+    convert(heights, MouldsTable, "moulds")  # they may exceed their limits; the other lengths were checked before
+    return structs.replace(raw.moulds, **{**lengths, **heights})
 
 
 def _for_leaves(printer: catalogue.Printer, lengths: dict[str, Any]) -> float:
