@@ -26,7 +26,7 @@ from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
-from unitcad.serve.request_guard import Limits, RequestGuard
+from unitcad.serve.request_guard import RequestGuard
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
@@ -58,13 +58,12 @@ class Setting:
     trusted: Trusted
     starts: Mapping[str, str | None]
     token: str
-    hosts: frozenset[str]
     port: int
     batch: Path | None = None
     campaign: tuple[Path, str] | None = None
 
 
-def application(live: Live, limits: Limits = Limits()) -> RequestGuard:  # noqa: B008  # frozen
+def application(live: Live) -> RequestGuard:
     """Return the ASGI application of a live page."""
     setting = live.setting
     routes = [
@@ -79,7 +78,7 @@ def application(live: Live, limits: Limits = Limits()) -> RequestGuard:  # noqa:
         Route("/cancel", live.cancel, methods=["POST"]),
     ]
     inner = Starlette(routes=routes, lifespan=live.lifespan)
-    return RequestGuard(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
+    return RequestGuard(inner, setting.token, setting.port, live.cookie, live.keys)
 
 
 class Live:
