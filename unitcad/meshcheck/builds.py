@@ -107,7 +107,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
         return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
         return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
-    low, high = extent(mesh.vertices[np.unique(mesh.faces)] if mesh.indexed else mesh.vertices)
+    low, high = extent(mesh.vertices[mesh.faces.reshape(-1)] if mesh.indexed else mesh.vertices)
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
@@ -140,7 +140,7 @@ def check_assembly(mesh: Mesh, deadline: Deadline, *, strict: bool = False) -> C
             return None
         solids.append(Solid(object, checked.facts.volume_mm3, source.object(start) or f"object {len(solids) + 1}"))
         facts.append(checked.facts)
-    low, high = extent(mesh.vertices[np.unique(mesh.faces)])
+    low, high = extent(mesh.vertices[mesh.faces.reshape(-1)])
     whole = Facts(
         triangles=len(mesh.faces),
         vertices=len(mesh.vertices),
@@ -258,7 +258,7 @@ def _measure_turned(instance: Instance) -> _Turned:
         corners = instance.triangles.rows[:, :3]
         a, b, c = (points[corner] for corner in corners.T)
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
-        return _Turned(np.stack(extent(points[np.unique(corners)])), area, abs(float(np.linalg.det(linear))))
+        return _Turned(np.stack(extent(np.concatenate([a, b, c]))), area, abs(float(np.linalg.det(linear))))
 
 
 def _geometry(
