@@ -173,25 +173,20 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)
     return tuple(
-        replace(item, locations=tuple(_with_file_places(_with_middle(place, mesh), mesh) for place in item.locations))
+        replace(item, locations=tuple(_with_file_places(_drawn(place, mesh), mesh) for place in item.locations))
         for item in findings
     )
 
 
-def _with_middle(place: Location, mesh: Mesh) -> Location:
-    """Return the location with the middle of its triangles and, where findings are drawn, the number of their mesh."""
-    if place.mesh is not None or (place.centre is not None and place.region is None):
+def _drawn(place: Location, mesh: Mesh) -> Location:
+    """Return the location with its triangles and the number of their mesh where findings are drawn."""
+    meshes = detail().meshes
+    if place.mesh is not None or meshes is None:
         return place
-    whole, meshes = place.region is not None, detail().meshes
-    region = place.region if whole else np.array(place.faces, np.int64)
-    centre = place.centre or place.xyz
-    if place.centre is None and len(region) and (whole or len(region) > 1 or centre is None):
-        low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
-        centre = point((low + high) / 2)
-    if meshes is None or (not len(region) and centre is None):
-        return replace(place, region=None, centre=centre)
-    number = next(i for i, known in enumerate(meshes) if known is mesh)
-    return replace(place, region=region, mesh=number, centre=centre)
+    region = place.region if place.region is not None else np.array(place.faces, np.int64)
+    if not len(region) and place.xyz is None:
+        return place
+    return replace(place, region=region, mesh=next(i for i, known in enumerate(meshes) if known is mesh))
 
 
 def _with_file_places(place: Location, mesh: Mesh) -> Location:

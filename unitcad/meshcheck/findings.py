@@ -71,9 +71,8 @@ class Location:
 
     A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
-    `line` is that of the first face if the format has lines, otherwise that of the fault. `centre`: of the box round
-    the faces, the same in whatever order they are, mm. `region`, for pictures: its triangles in the mesh of number
-    `mesh`.
+    `line` is that of the first face if the format has lines, otherwise that of the fault. `region`, for pictures: its
+    triangles in the mesh of number `mesh`.
     """
 
     face: int | None = None
@@ -84,7 +83,6 @@ class Location:
     faces: tuple[int, ...] = ()
     region: Any = field(default=None, compare=False, repr=False)
     mesh: int | None = field(default=None, compare=False, repr=False)
-    centre: Point | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.faces and self.face is None:
@@ -126,8 +124,7 @@ class Location:
 class Finding:
     """One rule that a file breaks: how often, and its first places.
 
-    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it. `known`: a baseline
-    lists it, and it does not fail.
+    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it.
     """
 
     code: str
@@ -136,7 +133,6 @@ class Finding:
     count: int = 1
     locations: tuple[Location, ...] = ()
     ends: bool = False
-    known: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return it JSON-ready."""
@@ -181,8 +177,8 @@ class FileReport:
 
     @property
     def verdict(self) -> str:
-        """`error`, `warning` or `pass`: the worst finding, infos and known ones aside."""
-        severities = {finding.severity for finding in self.findings if not finding.known}
+        """`error`, `warning` or `pass`: the worst finding, infos aside."""
+        severities = {finding.severity for finding in self.findings}
         return "error" if "error" in severities else "warning" if "warning" in severities else "pass"
 
     def __repr__(self) -> str:

@@ -28,8 +28,7 @@ def write_text(reports: Sequence[FileReport], fail_on: str) -> str:
     codes: set[str] = set()
     for report in reports:
         for finding in report.findings:
-            if not finding.known:
-                codes.add(finding.code)
+            codes.add(finding.code)
             lines.append(finding_line(report, finding))
         if report.verdict == "pass" and (size := _size(report.facts)):
             lines.append(f"{printable(report.path)}: passed: {size}")
@@ -41,8 +40,7 @@ def write_text(reports: Sequence[FileReport], fail_on: str) -> str:
 
 def finding_line(report: FileReport, finding: Finding) -> str:
     """Return a finding in one line: file, code, severity, message and its first places."""
-    known = " (known)" if finding.known else ""
-    return f"{printable(report.path)}: {finding.code} {finding.severity}{known}: {printable(with_places(finding, 3))}"
+    return f"{printable(report.path)}: {finding.code} {finding.severity}: {printable(with_places(finding, 3))}"
 
 
 _EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
@@ -69,8 +67,6 @@ def summary(reports: Sequence[FileReport], fail_on: str) -> str:
     warned = "failed by a warning (--fail-on warning)" if fail_on == "warning" else "warned"
     parts = [f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", warned)) if verdicts[name]]
     parts.append(f"{verdicts['pass']} passed")
-    if known := sum(finding.known for report in reports for finding in report.findings):
-        parts.append(counted(known, "known finding"))
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
 
 
@@ -96,13 +92,10 @@ _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
 def write_github(reports: Sequence[FileReport], fail_on: str) -> str:
-    """Write workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
+    """Write workflow commands: an annotation a finding, then a line for the log that counts."""
     lines = []
     for report in reports:
         for finding in report.findings:
-            if finding.known:
-                lines.append(f"known: {finding_line(report, finding)}")
-                continue
             title = f"{finding.code} {rules()[finding.code].title}"
             first = first_line(finding)
             where = f"file={_property(report.path)}" + (f",line={first}" if first is not None else "")
@@ -130,14 +123,14 @@ _MARKS = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_[]|~#$@!"} | {"<": "
 def write_markdown(reports: Sequence[FileReport], fail_on: str) -> str:
     """Write how many files failed, a table of all findings, the worst first, and how to fix them."""
     found = [(report, finding) for report in reports for finding in report.findings]
-    found.sort(key=lambda pair: (pair[1].known, -SEVERITIES.index(pair[1].severity)))
+    found.sort(key=lambda pair: -SEVERITIES.index(pair[1].severity))
     lines = ["## unitcad check", "", f"{summary(reports, fail_on)}."]
     if found:
         lines += ["", "| | file | rule | finding |", "| --- | --- | --- | --- |"]
         lines += [_row(report, finding) for report, finding in found[:MOST_ROWS]]
     if len(found) > MOST_ROWS:
         lines += ["", f"{len(found) - MOST_ROWS:,} more findings are in the log."]
-    codes = {finding.code for _, finding in found if not finding.known}
+    codes = {finding.code for _, finding in found}
     if codes:
         lines += ["", "How to fix:", ""]
         lines += [
@@ -147,9 +140,8 @@ def write_markdown(reports: Sequence[FileReport], fail_on: str) -> str:
 
 
 def _row(report: FileReport, finding: Finding) -> str:
-    severity = "known" if finding.known else finding.severity
     rule = f"{finding.code} {rules()[finding.code].title}"
-    return f"| {severity} | {_plain(report.path)} | {_plain(rule)} | {_plain(with_places(finding, 3))} |"
+    return f"| {finding.severity} | {_plain(report.path)} | {_plain(rule)} | {_plain(with_places(finding, 3))} |"
 
 
 def _plain(text: str) -> str:
@@ -159,20 +151,15 @@ def _plain(text: str) -> str:
     return shown.translate(_MARKS)
 
 
-def json_report(
-    reports: Sequence[FileReport], config: str | None = None, baseline: str | None = None
-) -> dict[str, Any]:
-    """Return the JSON object: {files: [{path, verdict, findings, facts}], config, baseline}.
-
-    A finding also says how to fix it, and whether the baseline lists it.
-    """
-    return {"files": [_entry(report) for report in reports], "config": config, "baseline": baseline}
+def json_report(reports: Sequence[FileReport], config: str | None = None) -> dict[str, Any]:
+    """Return the JSON object: {files: [{path, verdict, findings, facts}], config}; a finding also has its fix."""
+    return {"files": [_entry(report) for report in reports], "config": config}
 
 
 def _entry(report: FileReport) -> dict[str, Any]:
     entry = report.as_dict()
     for shown, finding in zip(entry["findings"], report.findings, strict=True):
-        shown |= {"fix": rules()[finding.code].fix, "known": finding.known}
+        shown["fix"] = rules()[finding.code].fix
     return entry
 
 
@@ -181,17 +168,12 @@ def write_junit(reports: Sequence[FileReport], fail_on: str) -> str:
     least = SEVERITIES.index(fail_on)
     cases, failed = [], 0
     for report in reports:
-        bad = [
-            finding for finding in report.findings if not finding.known and SEVERITIES.index(finding.severity) >= least
-        ]
+        bad = [finding for finding in report.findings if SEVERITIES.index(finding.severity) >= least]
         rest = [finding for finding in report.findings if finding not in bad]
         failed += bool(bad)
         inner = "".join(_failure(finding) for finding in bad)
         if rest:
-            others = "\n".join(
-                f"{item.code} {item.severity}{' (known)' if item.known else ''}: {with_places(item, 3)}"
-                for item in rest
-            )
+            others = "\n".join(f"{item.code} {item.severity}: {with_places(item, 3)}" for item in rest)
             inner += f"<system-out>{xml_text(_xml(others))}</system-out>"
         name = f"name={xml_attribute(_xml(report.path))}" + _time(report.seconds)
         cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
@@ -228,10 +210,7 @@ _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def sarif_log(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only.
-
-    Findings of the baseline are `unchanged`, and suppressed.
-    """
+    """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only."""
     index = {code: i for i, code in enumerate(rules())}
     return {
         "$schema": SCHEMA,
@@ -275,7 +254,6 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
     objects = dict.fromkeys(place.object for place in finding.locations if place.object)
     logical = {"logicalLocations": [{"name": name, "kind": "object"} for name in objects]} if objects else {}
     fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{finding.code}".encode()).hexdigest()
-    known = {"baselineState": "unchanged", "suppressions": [{"kind": "external"}]} if finding.known else {}
     return {
         "ruleId": finding.code,
         "ruleIndex": index[finding.code],
@@ -284,7 +262,6 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
         "locations": [{"physicalLocation": physical, **logical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": finding.count, "places": [place.as_dict() for place in finding.locations]},
-        **known,
     }
 
 
@@ -305,19 +282,10 @@ def _uri(path: str) -> str:
 FORMATS = ("text", "json", "github", "sarif", "junit", "markdown")
 
 
-def render(
-    reports: Sequence[FileReport],
-    format_: str,
-    fail_on: str = "error",
-    config: str | None = None,
-    baseline: str | None = None,
-) -> str:
-    """Return all reports in one of FORMATS, ending in a newline.
-
-    JSON names `config` and `baseline`, the files of settings and of known findings.
-    """
+def render(reports: Sequence[FileReport], format_: str, fail_on: str = "error", config: str | None = None) -> str:
+    """Return all reports in one of FORMATS, ending in a newline; JSON names `config`, the file of settings."""
     if format_ == "json":
-        written = _dump(json_report(reports, config, baseline))
+        written = _dump(json_report(reports, config))
     elif format_ == "sarif":
         written = _dump(sarif_log(reports))
     else:

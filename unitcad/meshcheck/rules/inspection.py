@@ -9,7 +9,7 @@ from typing import Any, Protocol, SupportsFloat
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Tick
-from unitcad.meshcheck.findings import SHOWN, Location, detail, point
+from unitcad.meshcheck.findings import SHOWN, Location, point
 from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.geometry.rays import Rays, cast
@@ -92,7 +92,7 @@ class Inspection:
         """How its faces meet each other; nothing where they are not compared."""
         if not self.cross or not len(self.topology.kept):
             return Crossings()
-        return crossings_of(self.topology, self.tick, every=detail().meshes is not None)
+        return crossings_of(self.topology, self.tick)
 
     @cached_property
     def material(self) -> Rays:
