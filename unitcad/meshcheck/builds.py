@@ -17,7 +17,7 @@ from manifold3d import Manifold
 
 from unitcad.geometry.arrays import Floats, cross, extent
 from unitcad.geometry.boxes import box_pairs
-from unitcad.meshcheck.findings import Facts, Finding, Location, counted, detail, ending, number, point
+from unitcad.meshcheck.findings import Facts, Finding, Location, counted, drawn_meshes, ending, number, point
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_step, representable, solid_of, weld_exact
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
 from unitcad.meshcheck.readers import threemf_schema as schema
@@ -169,7 +169,7 @@ def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:
 
 def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     """Return the findings with each location's faces as the file has them, and their line and object where known."""
-    meshes = detail().meshes
+    meshes = drawn_meshes()
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)
     return tuple(
@@ -180,7 +180,7 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
     """Return the location with its triangles and the number of their mesh where findings are drawn."""
-    meshes = detail().meshes
+    meshes = drawn_meshes()
     if place.mesh is not None or meshes is None:
         return place
     region = place.region if place.region is not None else np.array(place.faces, np.int64)

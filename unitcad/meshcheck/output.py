@@ -70,24 +70,6 @@ def summary(reports: Sequence[FileReport], fail_on: str) -> str:
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
 
 
-def statistics(reports: Sequence[FileReport]) -> str:
-    """Return how many files each rule hit and how often, most files first.
-
-    A finding that counts bytes is one occurrence.
-    """
-    files: Counter[str] = Counter()
-    times: Counter[str] = Counter()
-    for report in reports:
-        for finding in report.findings:
-            files[finding.code] += 1
-            times[finding.code] += 1 if rules()[finding.code].count_is_size else finding.count
-    lines = [
-        f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
-        for code, n in files.most_common()
-    ]
-    return "\n".join(lines) + "\n" if lines else "no findings\n"
-
-
 _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
@@ -164,45 +146,25 @@ def _entry(report: FileReport) -> dict[str, Any]:
 
 
 def write_junit(reports: Sequence[FileReport], fail_on: str) -> str:
-    """Write JUnit XML: a test case a file, a failure a finding at or above `fail_on`, the others in system-out."""
+    """Write JUnit XML: a test case a file, a failure a finding at or above `fail_on`."""
     least = SEVERITIES.index(fail_on)
     cases, failed = [], 0
     for report in reports:
-        bad = [finding for finding in report.findings if SEVERITIES.index(finding.severity) >= least]
-        rest = [finding for finding in report.findings if finding not in bad]
-        failed += bool(bad)
-        inner = "".join(_failure(finding) for finding in bad)
-        if rest:
-            others = "\n".join(f"{item.code} {item.severity}: {with_places(item, 3)}" for item in rest)
-            inner += f"<system-out>{xml_text(_xml(others))}</system-out>"
-        name = f"name={xml_attribute(_xml(report.path))}" + _time(report.seconds)
-        cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
-    known = [report.seconds for report in reports if report.seconds is not None]
-    total = sum(known) if known else None
-    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0"{_time(total)}>'
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        + "\n".join([f"<testsuites>{head}", *cases])
-        + ("\n</testsuite></testsuites>\n")
-    )
-
-
-def _time(seconds: float | None) -> str:
-    return "" if seconds is None else f' time="{seconds:.3f}"'
+        failures = [_failure(item) for item in report.findings if SEVERITIES.index(item.severity) >= least]
+        failed += bool(failures)
+        name = xml_attribute(printable(report.path))
+        cases.append(f'<testcase classname="unitcad.check" name={name}>{"".join(failures)}</testcase>')
+    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0">'
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f"<testsuites>{head}", *cases, "</testsuite></testsuites>", ""]
+    return "\n".join(lines)
 
 
 def _failure(finding: Finding) -> str:
     rule = rules()[finding.code]
     places = [f"at {text}" for place in finding.locations if (text := str(place))]
-    body = "\n".join([f"{finding.code} {rule.title}: {finding.message}", *places, f"Fix: {rule.fix}"])
-    head = f"type={xml_attribute(finding.code)} message={xml_attribute(_xml(with_places(finding, 3)))}"
-    return f"<failure {head}>{xml_text(_xml(body))}</failure>"
-
-
-def _xml(text: str) -> str:
-    """Replace the characters that XML 1.0 cannot hold."""
-    return "".join(c if c in "\t\n\r" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff")
-                   else "\ufffd" for c in text)  # fmt: skip
+    lines = [f"{finding.code} {rule.title}: {finding.message}", *places, f"Fix: {rule.fix}"]
+    head = f"type={xml_attribute(finding.code)} message={xml_attribute(printable(with_places(finding, 3)))}"
+    return f"<failure {head}>{xml_text(chr(10).join(map(printable, lines)))}</failure>"
 
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints, among
-from unitcad.meshcheck.findings import Finding, Location, counted, detail, point
+from unitcad.meshcheck.findings import Finding, Location, counted, most_locations, point
 from unitcad.meshcheck.geometry.crossings import (
     Crossings,
     Faces,
@@ -146,7 +146,7 @@ def _places(faces: Faces, pairs: Ints) -> list[Location]:
     by_place: dict[tuple[int, ...], Location] = {}
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
-    listed = max(_LISTED, detail().locations)
+    listed = max(_LISTED, most_locations())
     chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
     corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)]
     names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
