@@ -11,7 +11,6 @@ import os
 import signal
 import stat
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -23,7 +22,7 @@ from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.builds import CheckedMesh, check_3mf, check_assembly, check_on_bed, check_step, check_surface
-from unitcad.meshcheck.findings import Facts, FileReport, Finding, ending, limit_details, merge
+from unitcad.meshcheck.findings import Facts, FileReport, Finding, drawing, ending, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers import kind_of
 from unitcad.meshcheck.readers.read_step import missing
@@ -120,7 +119,7 @@ def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileR
 
 def _check_with(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
     meshes: list[Mesh] | None = [] if options.draw else None
-    with limit_details(options.locations, meshes):
+    with drawing(meshes):
         try:
             with keeping():
                 findings, facts = work(Deadline(options.limits.seconds))
@@ -276,7 +275,6 @@ def check_files(
 
 def check_guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
     """Call `check_file` with an alarm behind its clock; an inner fault becomes a finding, not a crash."""
-    begin = time.perf_counter()
     try:
         with _alarm(options.limits.seconds):
             report = check_file(path, options)
@@ -290,7 +288,6 @@ def check_guarded(path: str, options: Options, then: Then | None = None) -> File
         report = _report_stop(
             path, f"the check itself failed ({type(error).__name__}: {error}); please report the file"
         )
-    report = replace(report, seconds=time.perf_counter() - begin)
     return then(report) if then else report
 
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Location
 from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.rows import NEWLINE, NOT_FINITE, SPACE, numbers_of, table_of
-from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, stream
+from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, parse
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.f_file import F004, F011, Limits, Unreadable, not_a_number
 from unitcad.meshcheck.rules.p_package import P010, P013, P015, P016, P017, P018
@@ -58,122 +57,81 @@ def transform(text: str | None, model: Model) -> Floats:
     return identity
 
 
-_BLOCK = 1 << 18
+_BLOCK = 1 << 18  # bytes that stay in the processor's cache
 _OPEN = re.compile(rb"<(vertices|triangles)>")
-_LONGEST_TAG = len(b"<triangles>")
-_HEAD = {name: re.compile(rb"[ \t\r\n]*<" + name + rb'[ \t\r\n]+(\w+)="') for name in (b"vertex", b"triangle")}
+_XYZ = ("x", "y", "z")
+_COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
+_LISTS = {b"vertices": (b"vertex", _XYZ), b"triangles": (b"triangle", _COLUMNS)}
+"""Elements of a list, and their attributes, of which each needs the first three."""
 _WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
 _AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
-_ELEMENTS = {b"vertices": b"vertex", b"triangles": b"triangle"}
-_NAMES = {b"vertex": (b"x", b"y", b"z"), b"triangle": (b"v1", b"v2", b"v3", b"p1", b"p2", b"p3", b"pid")}
-"""Attributes, of which each element needs the first three."""
-_SHORTEST = 1500  # bytes; a shorter block costs the parser less
+_SHORTEST = 1500  # bytes; a shorter list costs the parser less
 _LONGEST_GAP = 200  # bytes between two numbers
 _MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
 _QUOTE = ord('"')
-
-
 _DIGITS = table_of(b"0123456789")
 _IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
 
 
-@dataclass(frozen=True)
-class UniformBlock:
-    """The elements of a uniform block.
+def cut_lists(data: bytes) -> tuple[bytes, dict[int, Floats | Ints]]:
+    """Return a part without the elements of uniform lists, and the lists by the places of their tags in the rest.
 
-    columns: the numbers (n,) of each attribute by its name; lines: the line (n,) of each element, 0 for the one on
-    which the block begins; line_ends: how many there are in the block.
+    All text between the numbers of a uniform list repeats. Vertices are (n, 3), triangles (m, 8), with lines counted
+    from the tag. Line ends stay, so that the parser counts them. In a comment, tags are none: then all stays.
     """
-
-    columns: dict[str, Floats | Ints]
-    lines: Ints
-    line_ends: int
-
-
-class Reader(Protocol):
-    """A reader of the elements that the parser reports."""
-
-    def inside(self, fed: int) -> tuple[int, str]:
-        """Return the number of open elements and the name of the innermost one if it belongs to the core.
-
-        The name is empty while the parser holds back some of the `fed` bytes.
-        """
-        ...
-
-    def take(self, name: str, found: UniformBlock) -> bool:
-        """Keep the elements of a list; return False if they have to be read one by one."""
-        ...
+    lists: dict[int, Floats | Ints] = {}
+    if b"<!" in data or data.count(b"<?") > 1:
+        return data, lists
+    pieces, size, at = list[bytes](), 0, 0
+    while (opened := _OPEN.search(data, at)) and (end := data.find(b"</", opened.end())) >= 0:
+        begin = opened.end()
+        found = _read_list(data, begin, end, opened[1]) if end - begin >= _SHORTEST else None
+        place = size + opened.start() - at
+        pieces += [data[at:begin], data[begin:end] if found is None else b"\n" * data.count(b"\n", begin, end)]
+        if found is not None:
+            lists[place] = found
+        size, at = size + len(pieces[-2]) + len(pieces[-1]), end
+    return b"".join([*pieces, data[at:]]), lists
 
 
-def rest_for_parser(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
-    """Yield what the parser has to read of a part. It must have parsed each piece before it asks for the next one."""
-    left, held, at, fed, open_list = iter(chunks), b"", 0, 0, b""  # `at` bytes of `held` are done
-    while True:
-        if not open_list:
-            found = _OPEN.search(held, at)
-            if found is None:
-                last = held.rfind(b"<", max(len(held) - _LONGEST_TAG, at))  # of a tag that may go on in the next chunk
-                cut = len(held) if last < 0 else last
-            else:
-                cut = found.start()
-            if cut > at:
-                yield held[at:cut]
-                fed, at = fed + cut - at, cut
-            if found is None:
-                chunk = next(left, b"")
-                if not chunk:
-                    break
-                held, at = held[at:] + chunk, 0
-                continue
-            depth, _ = reader.inside(fed)
-            yield found.group()
-            fed, at = fed + len(found.group()), found.end()
-            if reader.inside(fed) == (depth + 1, found.group(1).decode()):
-                open_list = found.group(1)
-            elif at < len(held):  # in a comment, for example: one full of tags would take long, tag by tag
-                yield held[at:]
-                fed, held, at = fed + len(held) - at, b"", 0
-            continue
-        while len(held) - at < _BLOCK and held.find(b"</", at) < 0 and (chunk := next(left, b"")):
-            held, at = held[at:] + chunk, 0
-        end = held.find(b"</", at, at + _BLOCK)
-        cut = held.rfind(b"/>", at, end if end >= 0 else at + _BLOCK) + 2
-        if cut < 2:
-            open_list = b""
-            continue
-        block, at = held[at:cut], cut
-        uniform = read_uniform(block, _ELEMENTS[open_list]) if len(block) >= _SHORTEST else None
-        if uniform is not None and reader.take(open_list.decode(), uniform):
-            block = b"\n" * uniform.line_ends
-            if block:
-                yield block
-            fed += len(block)
-            continue
-        yield block
-        fed += len(block)
-        # A comment or a section of characters may hold what looks like elements.
-        if b"<!" in block or b"<?" in block or reader.inside(fed)[1] != open_list.decode():
-            open_list = b""
-    if at < len(held):
-        yield held[at:]
+def _read_list(data: bytes, at: int, end: int, name: bytes) -> Floats | Ints | None:
+    """Return the vertices or triangles of a list, None if it is not uniform or an element needs a finding."""
+    element, known = _LISTS[name]
+    kept, lines, last = [], 0, data.rfind(b"/>", at, end) + 2
+    if data[last:end].strip():
+        return None
+    while at < last:
+        block = data[at : data.rfind(b"/>", at, min(at + _BLOCK, last)) + 2]
+        if (columns := _read_block(block, element, known)) is None:
+            return None
+        if name == b"vertices":
+            values = np.stack([columns[axis] for axis in _XYZ], axis=1)
+            if not (np.abs(values) <= LARGEST).all():
+                return None
+        else:
+            values = np.full((len(columns["line"]), LINE + 1), -1)
+            for i, column in enumerate(_COLUMNS):
+                values[:, i] = columns.get(column, -1)
+            values[:, LINE] = columns["line"] + lines
+            if not values[:, LINE - 1].all():  # no resource has the id 0
+                return None
+        kept.append(values)
+        lines += block.count(b"\n")
+        at += len(block)
+    return np.concatenate(kept)
 
 
-def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
-    """Return the elements of a block, `vertex` or `triangle`, or None if the block is not uniform.
-
-    In a uniform block all text between the numbers repeats, and each attribute is one of the core's.
-    """
+def _read_block(block: bytes, element: bytes, known: tuple[str, ...]) -> dict[str, Floats | Ints] | None:
+    """Return the attributes of elements as columns, and the line of each, 0 for the first; None if not uniform."""
     if b"\r" in block and block.count(b"\r") != block.count(b"\r\n"):
         return None
-    head = _HEAD[element].match(block)
+    head = re.match(rb"[ \t\r\n]*<" + element + rb'[ \t\r\n]+(\w+)="', block)
     if head is None:
         return None
-    names = [head.group(1)]
-    at = head.end()
+    names, at = [head[1].decode()], head.end()
     while within := _WITHIN.match(block, block.find(b'"', at)):
-        names.append(within.group(1))
+        names.append(within[1].decode())
         at = within.end()
-    known = _NAMES[element]
     if len(set(names)) < len(names) or not set(known[:3]) <= set(names) <= set(known):
         return None
     text = np.frombuffer(block, np.uint8)
@@ -182,17 +140,15 @@ def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
     if len(quotes) % each or _AFTER.fullmatch(block, int(quotes[-1])) is None:
         return None
     quotes = quotes.reshape(-1, each)
-    begin, end = quotes[:, ::2] + 1, quotes[:, 1::2]
     if not _same_between(text, quotes, block, head.group()):
         return None
-    numbers = _numbers(text, begin, end, whole=element == b"triangle")
+    numbers = _numbers(text, quotes[:, ::2] + 1, quotes[:, 1::2], whole=known is _COLUMNS)
     if numbers is None:
         return None
-    line_ends = np.flatnonzero(text == NEWLINE)
     first = block.index(b"<")
     starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
-    lines = np.searchsorted(line_ends, starts)
-    return UniformBlock({name.decode(): numbers[:, i] for i, name in enumerate(names)}, lines, len(line_ends))
+    lines = np.searchsorted(np.flatnonzero(text == NEWLINE), starts)
+    return {"line": lines, **{name: numbers[:, i] for i, name in enumerate(names)}}
 
 
 def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
@@ -254,10 +210,10 @@ _PLACEHOLDERS = {"undefined", "null"}
 class _Reader:
     """Handlers for expat; its state is the stack of open elements and the object or resource being read."""
 
-    def __init__(self, model: Model, limits: Limits, spent_faces: int) -> None:
-        self.model, self.limits, self.faces = model, limits, spent_faces
-        self.parser = new_parser()
-        self.parser.buffer_text = False  # the line of a text is that of its event
+    def __init__(self, model: Model, limits: Limits, spent_faces: int, lists: dict[int, Floats | Ints]) -> None:
+        self.model, self.limits, self.faces, self.lists = model, limits, spent_faces, lists
+        self.parser = new_parser(self.start, self.end)
+        self.parser.StartNamespaceDeclHandler = self.namespace
         self.parser.CharacterDataHandler = self.text_inside
         model.where = self._where
         self.stack: list[_Open] = [_Open("", "", None)]
@@ -280,37 +236,6 @@ class _Reader:
     def namespace(self, prefix: str | None, uri: str) -> None:
         self.model.namespaces[prefix or ""] = uri
 
-    def inside(self, fed: int) -> tuple[int, str]:
-        """Return the number of open elements and the name of the innermost one if it belongs to the core.
-
-        The name is empty while the parser holds back some of the `fed` bytes.
-        """
-        last = self.stack[-1]
-        whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == schema.CORE
-        return len(self.stack) + self.skip, last.name if whole else ""
-
-    def take(self, name: str, found: UniformBlock) -> bool:
-        """Keep the elements of a uniform block; return False if one of them needs a finding."""
-        if name == "vertices":
-            values = np.stack([found.columns[axis] for axis in _XYZ], axis=1)
-            if not (np.abs(values) <= LARGEST).all():
-                return False
-            self._flush_vertices()
-            self._keep_vertices(values)
-            return True
-        if "pid" in found.columns and not found.columns["pid"].all():
-            return False
-        self._flush_triangles()
-        rows = np.full((len(found.lines), LINE + 1), -1)
-        for i, column in enumerate(_COLUMNS):
-            if column in found.columns:
-                rows[:, i] = found.columns[column]
-        rows[:, LINE] = self.parser.CurrentLineNumber + found.lines
-        self.rows.append(rows)
-        self.rank += len(rows)
-        self._count_faces(len(rows))
-        return True
-
     def start(self, name: str, flat: list[str]) -> None:
         if self.skip:
             self.skip += 1
@@ -318,7 +243,7 @@ class _Reader:
                 raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
             return
         above = self.stack[-1]
-        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
+        if name == _VERTEX and flat[::2] == _PLAIN and above.name == "vertices" and above.space == schema.CORE:
             self.numbers += flat[1::2]
             self.lines.append(self.parser.CurrentLineNumber)
             self.stack.append(_LEAF)
@@ -404,9 +329,7 @@ class _Reader:
                 self.model.add(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
-        if space in (schema.CORE, schema.MATERIAL, schema.SLICE, schema.BEAM) and not (
-            rules is not None and parent.name == "resources"
-        ):
+        if rules is None or parent.name != "resources":
             self.model.add(P017, f"<{local}> inside <{parent.name}>")
 
     def _attributes(self, local: str, rules: schema.ElementSchema, attributes: dict[str, str]) -> bool:
@@ -443,8 +366,6 @@ class _Reader:
                 return
         if "id" in attributes and parent == "resources":
             self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
-        elif space == schema.BEAM or space == schema.BALLS:
-            self._take_lattice(local, attributes)
         elif self.resource is not None and not isinstance(self.resource, Object):
             self.resource.members.append({"": local, **attributes})
             if len(self.resource.members) > self.limits.max_faces:
@@ -488,6 +409,21 @@ class _Reader:
         kind = attributes.get("type", "model")
         self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
+    def _take_vertices(self, _: dict[str, str]) -> None:
+        vertices = self.lists.get(self.parser.CurrentByteIndex)
+        if vertices is not None:
+            self._flush_vertices()
+            self._keep_vertices(vertices)
+
+    def _take_triangles(self, _: dict[str, str]) -> None:
+        rows = self.lists.get(self.parser.CurrentByteIndex)
+        if rows is not None:
+            self._flush_triangles()
+            rows[:, LINE] += self.parser.CurrentLineNumber
+            self.rows.append(rows)
+            self.rank += len(rows)
+            self._count_faces(len(rows))
+
     def _take_triangle(self, attributes: dict[str, str]) -> None:
         row = tuple(int(attributes.get(name, -1)) for name in _COLUMNS)
         self.triangles.append((*row, self.parser.CurrentLineNumber))
@@ -513,34 +449,14 @@ class _Reader:
 
     def _take_build(self, attributes: dict[str, str]) -> None:
         self.model.has_build = True
-        self.model.build_uuid = f"{schema.PRODUCTION} UUID" in attributes
 
     def _use(self, attributes: dict[str, str]) -> Use:
         self.uses += 1
         if self.uses > self.limits.max_instances:
             raise F011.unreadable(f"more items and components than the limit of {self.limits.max_instances} instances")
-        uuid = attributes.get(f"{schema.PRODUCTION} UUID")
-        if uuid is not None and not schema.uuid(uuid):
-            self.model.add(P017, f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{schema.PRODUCTION} path", "")
         matrix = transform(attributes.get("transform"), self.model)
-        return Use(
-            int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
-        )
-
-    def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
-        if not isinstance(self.resource, Object):
-            return
-        if local == "beamlattice":
-            self.resource.lattice = attributes
-        elif local == "beam":
-            self.resource.beams.append(attributes)
-        elif local == "ball":
-            self.resource.balls.append(attributes)
-        elif local == "ref":
-            self.resource.beam_refs.append(int(attributes["index"]))
-        if len(self.resource.beams) > self.limits.max_faces:
-            raise F011.unreadable("more beams than --max-faces")
+        return Use(int(attributes["objectid"]), path, matrix, self.rank, self.parser.CurrentLineNumber)
 
     def _flush_vertices(self) -> None:
         if not self.numbers:
@@ -585,27 +501,21 @@ class _Reader:
             self.model.add(P017, f"object {resource.id} has a mesh and components")
 
 
-# Extensions whose elements take the place of an object's mesh.
-_SHAPES = {
-    schema.BOOLEAN,
-    schema.DISPLACEMENT,
-    schema.OLD_DISPLACEMENT,
-    schema.IMPLICIT,
-}
-_XYZ = ["x", "y", "z"]
-_COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
+# Extensions whose elements take the place of an object's mesh, or stand on its vertices.
+_SHAPES = {schema.BEAM, schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT}
+_PLAIN = list(_XYZ)
 _LEAF = _Open(schema.CORE, "vertex", None)
 _VERTEX = f"{schema.CORE} vertex"
 
 
 def read_model(
-    chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0, *, strict: bool = False
+    data: bytes, part: str, limits: Limits, tick: Tick, spent_faces: int = 0, *, strict: bool = False
 ) -> Model:
     """Read one model part. Schema faults are the model's findings; raises `Unreadable` if XML or a limit ends it."""
     model = Model(part, strict=strict)
-    reader = _Reader(model, limits, spent_faces)
+    text, lists = cut_lists(data)
     try:
-        stream(rest_for_parser(chunks, reader), part, reader.start, reader.end, reader.namespace, reader.parser)
+        parse(_Reader(model, limits, spent_faces, lists).parser, text, part, tick)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

@@ -9,7 +9,7 @@ from typing import Any, Protocol, SupportsFloat
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Tick
-from unitcad.meshcheck.findings import SHOWN, Location, detail, point
+from unitcad.meshcheck.findings import Location, point
 from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.geometry.rays import Rays, cast
@@ -92,7 +92,7 @@ class Inspection:
         """How its faces meet each other; nothing where they are not compared."""
         if not self.cross or not len(self.topology.kept):
             return Crossings()
-        return crossings_of(self.topology, self.tick, every=detail().meshes is not None)
+        return crossings_of(self.topology, self.tick)
 
     @cached_property
     def material(self) -> Rays:
@@ -111,8 +111,8 @@ class Options:
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
     `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict`: crossings too shallow for
     a printer are errors too. `strict_3mf`: content that the 3MF specification forbids and common programs write is an
-    error, not a warning. `unwanted`: prefixes of codes that no select brings back. `locations`: how many are kept of a
-    finding; `draw`: keep meshes with the report.
+    error, not a warning. `unwanted`: prefixes of codes that no select brings back. `draw`: keep the meshes with the
+    report, and more places, for pictures.
     """
 
     select: tuple[str, ...] = ()
@@ -125,7 +125,6 @@ class Options:
     strict_3mf: bool = False
     limits: Limits = field(default_factory=Limits)
     unwanted: tuple[str, ...] = ()
-    locations: int = SHOWN
     draw: bool = False
 
     def wants(self, code: str) -> bool:
