@@ -248,13 +248,6 @@ def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
     assert f"<td>{used} of 2</td>" in page
 
 
-def test_both_chains_measure_the_part_in_which_the_motor_runs(tmp_path):
-    """The silence before it would lower the amplitude of a chain without a fit."""
-    repeats(tmp_path, m=wave(300), e=np.where(TIME > 0.9, wave(90), 0.0))
-    levels = [one.level.value for one in campaign(tmp_path, BOTH + UNIT).levels]
-    assert levels == pytest.approx([0.3, 0.3], rel=0.01)
-
-
 def test_a_silent_record_has_a_page(tmp_path):
     """A sensor that was off: zeros, which have no spectrum."""
     repeats(tmp_path, m=wave(300), e=wave(90))

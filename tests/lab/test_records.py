@@ -13,11 +13,10 @@ from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, Scenario, syn
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable
 from unitcad.lab.chains import ChainTable, Mains, bandpass
-from unitcad.lab.chains.line import DROP_OUT, fit_line, of_mean, running_part
+from unitcad.lab.chains.line import DROP_OUT, fit_line, of_mean
 from unitcad.lab.record import measure_record
 
 SENSOR = SensorTable(quantity="displacement", unit="um")
-BAND = (60.0, 250.0)
 
 
 def turning(size, hertz):
@@ -25,7 +24,7 @@ def turning(size, hertz):
     return size * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0)
 
 
-def record(folder, x, band=BAND, mains=None, use=("line",)):
+def record(folder, x, band=(60.0, 250.0), mains=None, use=("line",)):
     wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=use))
     return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (mains or Mains(),), band, "a.wav")
@@ -152,41 +151,17 @@ def test_the_papers_chain_has_the_gain_that_it_states(zero_phase, hz):
     assert (bandpass.gain(chain, hz) < 1e-6) == (hz == 100.0)
 
 
-# The part of a record in which the motor runs.
-
-
-def gated(start, end, size=1.0):
-    inside = (start <= TIME) & (end > TIME)
-    return np.where(inside, 40.0 * np.sin(2 * np.pi * 123.4 * TIME), 0.0) + noise(size)
-
-
-@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (0.0, 0.9), (0.5, 1.4), (1.7, 2.1)])
+@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (0.0, 0.9), (0.5, 1.4), (1.7, 2.1), (0.6, 2.1), (0.3, 1.8)])
 @pytest.mark.parametrize("size", [0.01, 3.0])
-def test_a_motor_that_runs_for_less_than_half_is_measured(tmp_path, start, end, size):
-    result = record(tmp_path, gated(start, end, size) + wave(5, 50))
-    assert result.usable
-    assert abs(result.amplitude_um - 40.0) < max(4 * result.u_um, 0.002 * 40)
-    assert result.frequency_hz == pytest.approx(123.4, abs=0.2)
-    assert min(end, 2.0) - start - 0.2 < result.steady_s < min(end, 2.0) - start + 0.05
-    assert set(said(result)) <= {"L107", "L108", "L105"}
-    if result.steady_s < 1:
-        assert "only that part was used" in said(result)["L107"]
-
-
-def test_pulses_are_measured_in_the_longest(tmp_path):
-    result = record(tmp_path, gated(0.1, 0.4, 0.5) + gated(1.0, 1.5, 0.5))
-    assert result.amplitude_um == pytest.approx(40.0, rel=0.01)
-    assert 0.35 < result.steady_s < 0.55
-
-
-def test_beats_and_sweeps_are_no_silence():
-    """Two lines 0.2 Hz apart fade in and out; a motor that speeds up leaves its first frequency."""
-    time = np.arange(10 * RATE) / RATE
-    beat = 40 * np.sin(2 * np.pi * 125 * time) + 38 * np.sin(2 * np.pi * 125.2 * time + 1)
-    assert running_part(beat, np.ones(len(beat), bool), RATE, BAND, 50.0) is None
-    for rise in (2, 5, 12, 25):
-        sweep = 40 * np.sin(2 * np.pi * (115 * TIME + rise * TIME**2))
-        assert running_part(sweep, np.ones(len(sweep), bool), RATE, BAND, 50.0) is None
+def test_a_motor_that_runs_for_a_part_is_measured_there_or_not_used(tmp_path, start, end, size):
+    running = (start <= TIME) & (end > TIME)
+    result = record(tmp_path, np.where(running, wave(40.0, 123.4), 0.0) + noise(size) + wave(5, 50))
+    if running.mean() > 0.5:
+        assert result.usable
+    if result.usable:
+        assert result.amplitude_um == pytest.approx(40.0, rel=0.005)
+    else:
+        assert {"L110", "L111"} & set(said(result))
 
 
 # The findings.

@@ -55,7 +55,8 @@ RULES = {
             again as before. Fix: Repeat, five times or more.""",
             """L110 error: drop-outs
             More than a tenth of the samples were excluded: more than a robust fit bears. Example: A
-            vibrometer on bare skin. Fix: Put retroreflective tape on the point.""",
+            vibrometer on bare skin, a motor that runs for less than half of the record. Fix: Put retroreflective
+            tape on the point, or cut the record to the part in which the motor runs.""",
             """L111 error: no line
             The band has no line above five times its uncertainty. Example: The motor did not run.
             Fix: Repeat.""",
