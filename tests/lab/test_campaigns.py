@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import savemat, wavfile
+from scipy.io import wavfile
 from scipy.stats import ttest_ind, ttest_rel
-from signals import FULL, RATE, TIME, noise, repeats, wave, write
+from signals import RATE, TIME, noise, repeats, wave, write
 
 from benchmarks.accuracy.synthetic_records import Scenario, synthetic
 from tests.in_process import unitcad
@@ -317,55 +317,6 @@ def test_a_rate_that_the_file_contradicts_is_refused(tmp_path, ending):
     with refuses("recording.rate_hz") as refused:
         campaign(tmp_path, text.replace("2001", "2010"))
     assert refused.value.nearest == pytest.approx(2000.0, rel=1e-6)
-
-
-# Records of two loggers.
-
-
-@pytest.fixture
-def loggers(tmp_path):
-    """Motor records of one logger, MATLAB at 5 kHz; the edge's of another, text with times, at 2 kHz."""
-    for i in range(3):
-        time = np.arange(5000) / 5000
-        motor = 200 * np.sin(2 * np.pi * 123.0 * time) + np.random.default_rng(i).standard_normal(5000)
-        savemat(tmp_path / f"m{i}.mat", {"disp": motor[:, None], "temperature": np.zeros((5000, 1))})
-        rows = [f"{1e3 * t:.2f},{v:.4f},0" for t, v in zip(TIME[:2000], wave(50, 123.0) + noise(seed=i), strict=False)]
-        (tmp_path / f"e{i}.csv").write_text("\n".join(["clock,laser (um),spare", *rows]))
-    return tmp_path
-
-
-LOGGERS = '[[unit]]\nname = "a"\nreference = ["m0.mat", "m1.mat", "m2.mat"]\nedge = ["e0.csv", "e1.csv", "e2.csv"]\n'
-BASE = '[recording]\ntime_column = "clock"\ntime_unit = "ms"\nchannel = "laser"\n'
-OVERRIDE = '[[recording.override]]\nrecords = ["m*.mat"]\nrate_hz = 5000\nchannel = "disp"\n'
-
-
-def test_records_of_two_loggers_are_one_campaign(loggers):
-    write(loggers / "off.wav", 0 * TIME, wave(3, 50))
-    off = '[[recording.override]]\nrecords = ["off.wav"]\nchannel = 2\nrate_hz = 2000\n'
-    text = BASE + OVERRIDE + off + '[blank]\nrecords = ["off.wav"]\n' + LOGGERS
-    result = campaign(loggers, text, HEAD.replace("500.0", "1.0"))
-    assert result.levels[0].level.value == pytest.approx(0.25, rel=0.005)
-    assert result.levels[0].frequency_hz == pytest.approx(123.0, abs=0.01)
-    rates = {record.file: record.rate_hz for record in result.records["a"]}
-    assert (rates["m1.mat"], rates["e1.csv"]) == pytest.approx((5000, 2000))
-    assert dict(result.mains)[1] == pytest.approx(3.0 / FULL, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("own", "field", "nearest"),
-    [
-        ('records = ["m?.mta"]\nrate_hz = 5000\n', "recording.override.0.records.0", "m2.mat"),
-        ('records = ["m1.mat"]\n', "recording.override.0", None),
-        ("records = []\nrate_hz = 5000\n", "recording.override.0.records", None),
-        ('records = ["m*.mat"]\nmotor_channel = 2\n', "recording.override.0.motor_channel", None),
-        (OVERRIDE[23:] + OVERRIDE.replace("*", "1"), "recording.override.1.records.0", None),
-        ('records = ["m*.mat"]\nrate_hz = 5000\nchannel = "dsp"\n', "recording.override.0.channel", "disp"),
-    ],
-)
-def test_an_override_that_can_not_be_meant_is_refused(loggers, own, field, nearest):
-    with refuses(field) as refused:
-        campaign(loggers, f"{BASE}[[recording.override]]\n{own}{LOGGERS}", UM)
-    assert refused.value.nearest == nearest
 
 
 # Units between columns, files and records.

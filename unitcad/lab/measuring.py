@@ -25,8 +25,6 @@ from unitcad.lab.campaign import (
     SensorTable,
     UnitTable,
     check_files,
-    own_keys,
-    recording_of,
 )
 from unitcad.lab.chains import Chain, Mains, chains_of
 from unitcad.lab.chains.line import mains_columns, mains_orders, solve, trend_columns
@@ -159,8 +157,7 @@ def _mains_of_blanks(
     sensors = _sensors(campaign)
     largest: tuple[dict[int, float], ...] = tuple({} for _ in sensors)
     for name in campaign.blank.records:
-        with own_keys(campaign.recording, name):
-            signal = open_signal(folder / name, recording_of(campaign.recording, name), sensors, name)
+        signal = open_signal(folder / name, campaign.recording, sensors, name)
         expect_one_unit(stated, signal.units, sensors, name)
         time = np.arange(len(signal.samples)) / signal.rate
         orders = mains_orders(hertz, signal.rate, (), float(time[-1]))

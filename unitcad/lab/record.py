@@ -12,7 +12,7 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, own_keys, recording_of
+from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable
 from unitcad.lab.chains import LineFit, Mains, chains_of
 from unitcad.lab.chains.line import clip_level, fit_line, spectrum
 from unitcad.lab.readers import TIME_NAMES, UNITS, Layout, Recording, open_recording, plain, ratio, seconds, to_si
@@ -382,8 +382,7 @@ def measure_record(
 
     `band` is the band in which its line is searched, in Hz. Raises Refusal for a record that can't be read.
     """
-    with own_keys(campaign.recording, shown):
-        signal = open_signal(path, recording_of(campaign.recording, shown), sensors, shown)
+    signal = open_signal(path, campaign.recording, sensors, shown)
     chains, mains_hz = chains_of(campaign.chain), campaign.chain.mains_hz
     names = (shown, f"{shown}, motor")[: len(sensors)]
     samples, rate = signal.samples, signal.rate
