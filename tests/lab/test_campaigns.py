@@ -221,15 +221,6 @@ def test_two_motors_at_once_give_no_level(tmp_path):
     assert all("not used" in text for text in measure_command.lines(result) if ".wav" in text)
 
 
-def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path):
-    repeats(tmp_path, e=wave(90, 44.0) + wave(27, 88.0, 1), m=wave(300, 44.0) + wave(90, 88.0, 1))
-    result = campaign(tmp_path, UNIT)
-    assert result.levels == ()
-    outside = [one.message for one in result.findings if one.code == "L117"]
-    assert len(outside) == 6
-    assert "about 44 Hz" in outside[0]
-
-
 def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
     repeats(tmp_path, m=wave(300), e=wave(90))
     write(tmp_path / "e1.wav", np.clip(wave(90), -30, 30))

@@ -241,13 +241,6 @@ def test_missing_samples_are_counted_and_named(tmp_path, part, severity):
         assert result.amplitude_um == pytest.approx(100.0, abs=3 * result.u_um)
 
 
-def test_a_line_outside_the_search_is_named(tmp_path):
-    near = (0.8 * 127.3, 1.2 * 127.3)
-    message = said(record(tmp_path, wave(100, 160.0) + noise(2.0), near))["L111"]
-    assert message.endswith("the strongest line outside that is at about 160 Hz")
-    assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("count", [2, 3])
 def test_a_record_of_few_samples_has_no_line_and_no_warning(tmp_path, count):

@@ -255,7 +255,7 @@ def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
     """Chart the spectrum near the line with the zeros of the chains' combs, or all of it without a sure line."""
     frequency, size = record.picture[2:]
     hertz = record.frequency_hz
-    if hertz and not any(one.code == "L117" for one in record.findings):
+    if hertz:
         near = np.abs(frequency - hertz) < BESIDE_HZ
         frequency, size = frequency[near], size[near]
     floor = float(np.median(size)) / 10 if len(size) and np.median(size) > 0 else 1e-12

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -254,8 +253,4 @@ def _levels(
         if result.scatter > MOST_DISAGREEMENT:
             message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
             findings.append(finding("L109", where, message))
-    for one, other in combinations(levels, 2):
-        if one.level.high < other.level.low or other.level.high < one.level.low:
-            said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
-            findings.append(finding("L115", where, said))
     return levels, findings

@@ -59,22 +59,16 @@ RULES = {
             tape on the point, or cut the record to the part in which the motor runs.""",
             """L111 error: no line
             The band has no line above five times its uncertainty. Example: The motor did not run.
-            Fix: Repeat.""",
+            Fix: Repeat, or set chain.band_hz to the motor's frequency.""",
             """L112 error: too few repeats
             Fewer than three usable records are left: no level is given. Example: One of three is
             clipped. Fix: Repeat.""",
             """L114 warning: not fit for a chain
             The chain gives no amplitude of a record with drop-outs, missing samples or too few samples.
             Example: The chain bandpass and a spike. Fix: Use the chain line.""",
-            """L115 warning: chains disagree
-            The intervals of two chains do not overlap. Example: Hum that one chain does not remove.
-            Fix: Look at the spectra of the records.""",
             """L116 error: motor and unit at different frequencies
             No line of the unit is within a tenth of the motor's frequency: no level is given.
             Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
-            """L117 error: stronger line outside the band
-            A line outside chain.band_hz is stronger than the one in it, which may be its harmonic.
-            Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
             """L118 warning: low signal to noise
             The amplitude is less than ten times the standard deviation of the residual; if twice its uncertainty
             exceeds it, it is an error. Example: A point far from the unit. Fix:
@@ -312,7 +306,6 @@ LEAST_OVER_U = 5
 """The strongest of the 400 bins of noise in a band of 190 Hz over 2 s is above 4 in a record of ten, above 5 in few of
 a thousand.
 """
-TREMOR_HZ = 20
 _ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _OF_THE_RATE = ("L102", "L108")
 """Findings of the rate and the span, which unit and motor share."""
@@ -383,15 +376,13 @@ def measure_record(
     `band` is the band in which its line is searched, in Hz. Raises Refusal for a record that can't be read.
     """
     signal = open_signal(path, campaign.recording, sensors, shown)
-    chains, mains_hz = chains_of(campaign.chain), campaign.chain.mains_hz
+    chains = chains_of(campaign.chain)
     names = (shown, f"{shown}, motor")[: len(sensors)]
     samples, rate = signal.samples, signal.rate
     frequency, size = spectrum(np.where(np.isfinite(samples[:, 0]), samples[:, 0], 0.0), rate)
     low = frequency <= min(HIGHEST_HZ, rate / 2)
     frequency, size = frequency[low], size[low]
     picture = (np.arange(len(samples)) / rate, samples[:, 0], frequency, size)
-    hertz = _outside(frequency, size, band, mains_hz)
-    hint = f"; the strongest line outside that is at about {hertz:.0f} Hz" if hertz else ""
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
         findings.append(finding("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
@@ -410,23 +401,18 @@ def measure_record(
         return replace(none, findings=tuple(findings))
     for each, where in zip(fits, names, strict=True):
         if each is None:
-            message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz{hint}"
+            message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz"
             return replace(none, findings=(*findings, finding("L111", where, message)))
     fit, *motors = (each for each in fits if each)
     motor = motors[0] if motors else None
     for each, where, known in zip((fit, *motors), names, mains, strict=False):
         for one in _of_line(each, rate, signal.raw_rate, where, known):
-            if (one.code, where) == ("L111", shown):
-                one = replace(one, message=one.message + hint)
             if each is fit or one.code not in _OF_THE_RATE:
                 findings.append(one)
     steady, length = fit.end_s - fit.start_s, len(samples) / rate
     if steady < LEAST_STEADY * length and not any(one.severity == "error" for one in findings):
         message = f"steady for {steady:.2f} s of {length:.2f} s; only that part was used"
         findings.append(finding("L107", shown, message))
-    outside = _outside(frequency, size, campaign.chain.band_hz, mains_hz, fit.frequency_hz)
-    if outside is not None:
-        findings.append(finding("L117", shown, f"a stronger line is at about {outside:.0f} Hz, outside chain.band_hz"))
     hertz = fit.frequency_hz
     scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
     factor, ratio, lag = abs(scales[0]), None, None
@@ -527,29 +513,6 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     elif fit.snr < LEAST_SNR and scatter <= MOST_SCATTER:  # a modulation is no noise
         say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
     return sorted(out, key=lambda one: one.code)
-
-
-def _outside(
-    frequency: Floats, size: Floats, band: tuple[float, float], mains_hz: float, own_hz: float | None = None
-) -> float | None:
-    """Return the frequency of the strongest line outside a band; None if all is noise there.
-
-    `frequency` and `size` are a spectrum. The mains are no line. With `own_hz`, the line in the band, neither are its
-    harmonics, and a weaker one than it is none either.
-    """
-    near = max(1.0, 3 * float(frequency[1] - frequency[0])) if len(frequency) > 1 else 1.0
-    outside = (frequency > TREMOR_HZ) & ((frequency < band[0] - near) | (frequency > band[1] + near))
-    outside &= np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > near
-    least = 0.0
-    if own_hz is not None:
-        own = np.abs(frequency - own_hz) <= near
-        harmonic = np.abs(frequency - own_hz * np.round(frequency / own_hz)) <= near
-        outside &= (frequency < 1.5 * own_hz) | ~harmonic
-        least = size[own].max(initial=0.0) if own.any() else np.inf
-    if not outside.any():
-        return None
-    at = int(np.argmax(np.where(outside, size, 0.0)))
-    return float(frequency[at]) if size[at] > max(8 * float(np.median(size[outside])), least) else None
 
 
 def _clipped(samples: Floats) -> float:
