@@ -78,24 +78,11 @@ def test_the_files_of_a_campaign(folder, monkeypatch):
     for table in (measured["record"], measured["source"]):
         assert [one["sha256"] for one in table] == [sha256(Path(one["file"])) for one in table]
     assert {one["file"] for one in measured["source"]} == {"c.toml", "off.wav"}
-    charts = {f"record-{i:02d}-{kind}.svg" for i in range(1, 10) for kind in ("time", "periods", "spectrum")}
-    assert set(files) == {"measured.toml", "measure.json", "measure.html", "decay-01.svg", *charts}
+    assert set(files) == {"measured.toml", "measure.json", "measure.html"}
     page = files["measure.html"].decode().replace("http://www.w3.org/2000/svg", "")
     assert not [part for part in ("http://", "<script") if part in page]
     again = json.loads(unitcad("measure", "c.toml", "--json").stdout)
     assert again["levels"] == measured["level"]
-
-
-def test_a_second_run_replaces_its_own_files_only(tmp_path):
-    repeats(tmp_path, m=wave(300), e=wave(90), s=wave(40))
-    point = '[[unit.point]]\ndistance_mm = 5.0\nrecords = ["s0.wav", "s1.wav", "s2.wav"]\n'
-    out = tmp_path / "out"
-    measure_command.write(campaign(tmp_path, UNIT + point), out)
-    (out / "record-01-time.svg.bak").write_text("mine")
-    assert (out / "record-09-time.svg").exists()
-    measure_command.write(campaign(tmp_path, UNIT), out)
-    assert (out / "record-01-time.svg.bak").read_text() == "mine"
-    assert not (out / "record-07-time.svg").exists()
 
 
 def test_a_motor_channel_gives_the_ratio_and_the_lag(tmp_path):
@@ -231,7 +218,7 @@ def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
     assert "not used" in lines["e1.wav"]
     data = {one["file"]: one for one in measure_command.as_data(result)["records"]}
     assert (data["e1.wav"]["usable"], data["e1.wav"]["u_um"]) == (False, None)
-    page = measure_command.page(result, {})
+    page = measure_command.page(result)
     assert "<td>e1.wav</td><td>no</td><td></td>" in page
     used = f"{result.records['a'][5].steady_s:.3g}"
     assert 1.0 < float(used) < 1.4
@@ -245,7 +232,7 @@ def test_a_silent_record_has_a_page(tmp_path):
     write(tmp_path / "e1.wav", 0 * TIME)
     result = campaign(tmp_path, BOTH + UNIT)
     assert ("L111", "e1.wav") in {(one.code, one.where) for one in result.findings}
-    assert "e1.wav: spectrum" in measure_command.charts_of(result)["record-05-spectrum.svg"]
+    assert "e1.wav: spectrum" in measure_command.page(result)
 
 
 # Refusals.

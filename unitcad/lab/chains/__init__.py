@@ -105,9 +105,6 @@ class Chain:
     amplitude: Callable[[Floats, float, LineFit], float]
     unfit: Callable[[list[LineFit]], str] = lambda fits: ""
     gain: Callable[[float], float] | None = None
-    zeros_hz: float | None = None
-    """The frequency whose multiples the chain takes away."""
-    pass_hz: tuple[float, float] | None = None
     assumed: Mapping[str, Any] = field(default_factory=dict)
     """Parameters that the chain's source does not state, with the values that are assumed."""
 
