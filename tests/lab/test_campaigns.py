@@ -37,16 +37,15 @@ def campaign(folder, text, head=HEAD):
 
 @pytest.fixture
 def folder(tmp_path):
-    """A campaign with a motor, an edge and a point, each with mains, harmonics, drift and spin-up; and a blank."""
+    """A campaign with a motor, an edge and a point, each with mains, harmonics, drift and spin-up."""
     settings = {"snr": 60.0, "drift": 0.004, "mains": (0.01, 0.004, 0.004), "harmonics": (0.1, 0.05)}
     scenario = Scenario("lab", spin_up_s=0.05, **settings)
     for name, size, hertz in (("m", 300, 122), ("e", 120, 122.5), ("s", 30, 121.6)):
         for i in range(3):
             rng = np.random.default_rng([0, i, size])
             write(tmp_path / f"{name}{i}.wav", synthetic(scenario, rng, size * (1 + 0.02 * (i - 1)), hertz).x)
-    write(tmp_path / "off.wav", wave(3, 50) + wave(1.2, 100))
     point = '[[unit.point]]\ndistance_mm = 10.0\nrecords = ["s0.wav", "s1.wav", "s2.wav"]\n'
-    text = f'[blank]\nrecords = ["off.wav"]\n{BOTH}{UNIT}spec = "encapsulating"\n{point}'
+    text = f'{BOTH}{UNIT}spec = "encapsulating"\n{point}'
     (tmp_path / "c.toml").write_text(NAME + HEAD + "full_scale = 500.0\n" + text)
     return tmp_path
 
@@ -62,7 +61,6 @@ def test_a_campaign_has_the_levels_of_its_truth(folder):
     for record in result.records["a"]:
         assert record.u_um < 0.02 * record.amplitude_um
         assert record.gains["bandpass"] == pytest.approx(1.0, abs=0.01)
-    assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
 
 
 def test_the_files_of_a_campaign(folder, monkeypatch):
@@ -77,7 +75,7 @@ def test_the_files_of_a_campaign(folder, monkeypatch):
     assert measured["assumed"] == {"order": 4, "q": 30.0, "zero_phase": True, "measure": "rms", "trim_s": 0.25}
     for table in (measured["record"], measured["source"]):
         assert [one["sha256"] for one in table] == [sha256(Path(one["file"])) for one in table]
-    assert {one["file"] for one in measured["source"]} == {"c.toml", "off.wav"}
+    assert {one["file"] for one in measured["source"]} == {"c.toml"}
     assert set(files) == {"measured.toml", "measure.json", "measure.html"}
     page = files["measure.html"].decode().replace("http://www.w3.org/2000/svg", "")
     assert not [part for part in ("http://", "<script") if part in page]
@@ -106,7 +104,6 @@ def test_a_levels_interval_is_welchs():
     pairs = level([a / b for a, b in zip(edge, motor, strict=False)])
     paired = ttest_rel(np.log(edge[:3]), np.log(motor)).confidence_interval(0.95)
     assert (pairs.low, pairs.high) == pytest.approx((math.exp(paired.low), math.exp(paired.high)), rel=1e-9)
-    assert level(edge, motor, shared=0.1).high > found.high
 
 
 def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -57,12 +58,6 @@ class RecordingTable(Table, frozen=True, kw_only=True):
     skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning of a file")] = None
 
 
-class BlankTable(Table, frozen=True, kw_only=True):
-    """Records with the motor off. They show the mains of the sensor."""
-
-    records: Annotated[Records, Meta(description="records with the motor off")] = ()
-
-
 class PointTable(Table, frozen=True, kw_only=True):
     """Records at a distance from the unit's edge along the skin."""
 
@@ -86,7 +81,6 @@ class Campaign(Table, frozen=True, kw_only=True):
     sensor: SensorTable
     recording: RecordingTable = RecordingTable()
     motor_sensor: SensorTable | None = None
-    blank: BlankTable = BlankTable()
     chain: ChainTable = ChainTable()
     unit: Annotated[tuple[UnitTable, ...], Meta(min_length=1, description="one [[unit]] table or more")]
 
@@ -128,16 +122,14 @@ def check_files(campaign: Campaign, folder: Path) -> None:
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
     one unit by its path or its bytes.
     """
-    blanks = [(f"blank.records.{i}", name) for i, name in enumerate(campaign.blank.records)]
     by_unit = []
     for i, unit in enumerate(campaign.unit):
         places = {"reference": unit.reference, "edge": unit.edge}
         places |= {f"point.{k}.records": point.records for k, point in enumerate(unit.point)}
         by_unit.append([(f"unit.{i}.{at}.{k}", name) for at, names in places.items() for k, name in enumerate(names)])
-    every = [*blanks, *(one for records in by_unit for one in records)]
     for i, unit in enumerate(campaign.unit):
         source_file(unit, folder, f"unit.{i}")
-    for field, name in every:
+    for field, name in chain.from_iterable(by_unit):
         expect_ending(file_of(folder, name, field), field)
     for records in by_unit:
         sizes = [(folder / name).stat().st_size for _, name in records]

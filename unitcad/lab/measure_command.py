@@ -82,19 +82,12 @@ def measured_table(result: Measured) -> dict[str, Any]:
 
 def as_data(result: Measured) -> dict[str, Any]:
     """Return everything as JSON-ready data."""
-    hertz = result.campaign.chain.mains_hz
-
-    def mains(blank: tuple[tuple[int, float], ...]) -> list[dict[str, float]]:
-        return rounded([{"hz": order * hertz, "amplitude": value} for order, value in blank], 6)
-
     return {
         "campaign": msgspec.to_builtins(result.campaign),
         "levels": measured_table(result)["level"],
         "records": [{"unit": unit, **record.as_dict()} for unit, record in _each_record(result)],
         "findings": [finding.as_dict() for finding in result.findings],
         "assumed": result.assumed,
-        "mains_of_blank": mains(result.mains),
-        "mains_of_blank_motor": mains(result.motor_mains),
     }
 
 

@@ -3,7 +3,7 @@
 1. Coarse frequency by a spectrum. 2. Demodulate, cut the spin-up, smooth the phase. 3. Least squares on three
 harmonics, the lines of the mains that the record resolves, offset and slope, again without outliers. Mains and outliers
 are then removed and 2 and 3 repeated once. 4. The amplitude's uncertainty is that of the noise's density at the line
-over the record's length, of the scatter of blocks, and of mains that can't be separated.
+over the record's length, and of the scatter of blocks.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from scipy.signal import oaconvolve
 from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains import Chain, ChainTable, LineFit, Mains, Phase
+from unitcad.lab.chains import Chain, ChainTable, LineFit, Phase
 
 BAND_HZ = (60.0, 250.0)
-NO_MAINS = Mains()
 HARMONICS = 3
 FAR = 4.5
 """Robust standard deviations of the residual beyond which a sample is excluded; noise exceeds it now and then."""
@@ -40,7 +39,7 @@ def fit_line(
     x: Floats,
     rate: float,
     band: tuple[float, float] = BAND_HZ,
-    mains: Mains = NO_MAINS,
+    mains_hz: float = 50.0,
     full_scale: float | None = None,
     motor: LineFit | None = None,
 ) -> LineFit | None:
@@ -68,9 +67,9 @@ def fit_line(
         edges = np.linspace(*span, max(round(length / 0.5), 2) + 1)
         frequencies = np.diff(phase(edges)) / np.diff(edges) / (2 * np.pi)
         frequency, spread = float(frequencies.mean()), float(np.ptp(frequencies))
-        orders = mains_orders(mains.frequency_hz, rate, (frequency,), length, spread)
+        orders = mains_orders(mains_hz, rate, (frequency,), length, spread)
         line = line_columns(phase(here), frequency, rate)
-        columns = np.concatenate([line, mains_columns(here, mains.frequency_hz, orders), trend_columns(here)])
+        columns = np.concatenate([line, mains_columns(here, mains_hz, orders), trend_columns(here)])
         use = known[inside]
         if use.sum() < LEAST_SAMPLES:
             return None
@@ -106,15 +105,12 @@ def fit_line(
         beside, size = line_beside(
             turned, rate, max(LEAST_LINE * amplitude, OVER_NOISE * deviation * np.sqrt(2 / use.sum()))
         )
-        order = round(frequency / mains.frequency_hz)
+        order = round(frequency / mains_hz)
         order = 0 if order in orders else order
-        # Mains that the record can't tell from the line have any phase: their part is that of a motor-off record.
-        share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if order else 0.0
         fit = LineFit(
             amplitude=abs(value),
-            u=float(np.sqrt(noise**2 + wander**2 + share**2)),
+            u=float(np.hypot(noise, wander)),
             u_noise=noise,
-            u_mains=float(share),
             value=value,
             frequency_hz=frequency,
             drift=spread / frequency,
@@ -126,7 +122,7 @@ def fit_line(
             dropped=masked if beyond_noise else 0.0,
             missing=float(np.mean(~good)),
             clipped=clipped,
-            mains_hz=order * mains.frequency_hz,
+            mains_hz=order * mains_hz,
             second_hz=frequency + beside if beside else 0.0,
             phase=phase,
         )
@@ -137,7 +133,7 @@ def fit_line(
         return found and found[0]
     # Demodulate and fit; then again without the mains and the drop-outs of the first fit.
     fit, clean, usable = None, x, known
-    frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
+    frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains_hz)
     for _ in range(2 if frequency > 0 else 0):
         at, line = envelope(clean, usable, time, rate, frequency)
         if len(at) < 4:
