@@ -178,10 +178,8 @@ def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
         sync_folder(path.parent)
 
 
-def replace_all(
-    folder: Path, contents: Mapping[str, bytes], last: str, former: re.Pattern[str] = re.compile("(?!)")
-) -> None:
-    """Write files into a folder in place of those of a former run: of names that match `former`, none other is left.
+def replace_all(folder: Path, contents: Mapping[str, bytes], last: str) -> None:
+    """Write files into a folder in place of those of a former run.
 
     All are written under another name first. The file `last` is removed before anything is changed and put in place
     at the end: it marks a whole result. Raises OSError.
@@ -195,9 +193,6 @@ def replace_all(
                 (where / name).parent.mkdir(parents=True, exist_ok=True)
             write_new(inside / name, content)
         (folder / last).unlink(missing_ok=True)
-        for path in sorted(folder.iterdir()):
-            if former.fullmatch(path.name) and path.name not in contents and not path.is_dir():
-                path.unlink()
         for name in sorted(contents, key=lambda name: name == last):
             (inside / name).replace(folder / name)
 

@@ -12,12 +12,11 @@ from signals import RATE, TIME, noise, wave
 from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, Scenario, synthetic
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable
-from unitcad.lab.chains import ChainTable, Mains, bandpass
-from unitcad.lab.chains.line import DROP_OUT, fit_line, of_mean, running_part
+from unitcad.lab.chains import ChainTable, bandpass
+from unitcad.lab.chains.line import DROP_OUT, fit_line, of_mean
 from unitcad.lab.record import measure_record
 
 SENSOR = SensorTable(quantity="displacement", unit="um")
-BAND = (60.0, 250.0)
 
 
 def turning(size, hertz):
@@ -25,10 +24,10 @@ def turning(size, hertz):
     return size * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0)
 
 
-def record(folder, x, band=BAND, mains=None, use=("line",)):
+def record(folder, x, band=(60.0, 250.0), use=("line",)):
     wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=use))
-    return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (mains or Mains(),), band, "a.wav")
+    return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), band, "a.wav")
 
 
 def said(result):
@@ -107,12 +106,9 @@ def test_one_drifting_line_is_not_several():
         assert fit.amplitude == pytest.approx(made.amplitude, rel=0.01)
 
 
-def test_mains_beside_the_line_are_in_the_uncertainty():
+def test_mains_beside_the_line_are_named():
     made = synthetic(Scenario("mains", mains=(0.0, 0.05, 0.0)), np.random.default_rng(4), 1.0, 100.01)
-    alone, known = fitted(made.x), fitted(made.x, mains=Mains(blank=((2, 0.05),)))
-    assert alone.mains_hz == known.mains_hz == 100.0
-    assert known.u_mains == pytest.approx(0.05 / math.sqrt(2), rel=0.03)
-    assert abs(known.amplitude - made.amplitude) < 2 * known.u
+    assert fitted(made.x).mains_hz == 100.0
     assert fitted(synthetic(PLAIN, np.random.default_rng(4), 1.0, 103.0).x).mains_hz == 0.0
 
 
@@ -152,41 +148,17 @@ def test_the_papers_chain_has_the_gain_that_it_states(zero_phase, hz):
     assert (bandpass.gain(chain, hz) < 1e-6) == (hz == 100.0)
 
 
-# The part of a record in which the motor runs.
-
-
-def gated(start, end, size=1.0):
-    inside = (start <= TIME) & (end > TIME)
-    return np.where(inside, 40.0 * np.sin(2 * np.pi * 123.4 * TIME), 0.0) + noise(size)
-
-
-@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (0.0, 0.9), (0.5, 1.4), (1.7, 2.1)])
+@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (0.0, 0.9), (0.5, 1.4), (1.7, 2.1), (0.6, 2.1), (0.3, 1.8)])
 @pytest.mark.parametrize("size", [0.01, 3.0])
-def test_a_motor_that_runs_for_less_than_half_is_measured(tmp_path, start, end, size):
-    result = record(tmp_path, gated(start, end, size) + wave(5, 50))
-    assert result.usable
-    assert abs(result.amplitude_um - 40.0) < max(4 * result.u_um, 0.002 * 40)
-    assert result.frequency_hz == pytest.approx(123.4, abs=0.2)
-    assert min(end, 2.0) - start - 0.2 < result.steady_s < min(end, 2.0) - start + 0.05
-    assert set(said(result)) <= {"L107", "L108", "L105"}
-    if result.steady_s < 1:
-        assert "only that part was used" in said(result)["L107"]
-
-
-def test_pulses_are_measured_in_the_longest(tmp_path):
-    result = record(tmp_path, gated(0.1, 0.4, 0.5) + gated(1.0, 1.5, 0.5))
-    assert result.amplitude_um == pytest.approx(40.0, rel=0.01)
-    assert 0.35 < result.steady_s < 0.55
-
-
-def test_beats_and_sweeps_are_no_silence():
-    """Two lines 0.2 Hz apart fade in and out; a motor that speeds up leaves its first frequency."""
-    time = np.arange(10 * RATE) / RATE
-    beat = 40 * np.sin(2 * np.pi * 125 * time) + 38 * np.sin(2 * np.pi * 125.2 * time + 1)
-    assert running_part(beat, np.ones(len(beat), bool), RATE, BAND, 50.0) is None
-    for rise in (2, 5, 12, 25):
-        sweep = 40 * np.sin(2 * np.pi * (115 * TIME + rise * TIME**2))
-        assert running_part(sweep, np.ones(len(sweep), bool), RATE, BAND, 50.0) is None
+def test_a_motor_that_runs_for_a_part_is_measured_there_or_not_used(tmp_path, start, end, size):
+    running = (start <= TIME) & (end > TIME)
+    result = record(tmp_path, np.where(running, wave(40.0, 123.4), 0.0) + noise(size) + wave(5, 50))
+    if running.mean() > 0.5:
+        assert result.usable
+    if result.usable:
+        assert result.amplitude_um == pytest.approx(40.0, rel=0.005)
+    else:
+        assert {"L110", "L111"} & set(said(result))
 
 
 # The findings.
@@ -218,14 +190,6 @@ def test_a_low_signal_to_noise_is_said(tmp_path, ratio, found):
     result = record(tmp_path, wave(10) + noise(10 / ratio))
     assert severities(result) == found
     assert result.usable
-
-
-def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path):
-    """A line under mains as large as itself: the noise is small, and yet nothing is known."""
-    result = record(tmp_path, wave(10, 100.0) + noise(0.05), mains=Mains(blank=((2, 9.0),)))
-    assert ("L118", "error") in severities(result)
-    assert "L111" not in said(result)
-    assert not result.usable
 
 
 @pytest.mark.parametrize(("first", "last"), [(115.0, 139.0), (139.0, 115.0)])
@@ -264,13 +228,6 @@ def test_missing_samples_are_counted_and_named(tmp_path, part, severity):
     if result.usable:
         assert "missing" in said(result)["L114"]
         assert result.amplitude_um == pytest.approx(100.0, abs=3 * result.u_um)
-
-
-def test_a_line_outside_the_search_is_named(tmp_path):
-    near = (0.8 * 127.3, 1.2 * 127.3)
-    message = said(record(tmp_path, wave(100, 160.0) + noise(2.0), near))["L111"]
-    assert message.endswith("the strongest line outside that is at about 160 Hz")
-    assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
 
 
 @pytest.mark.filterwarnings("error")

@@ -19,8 +19,8 @@ from unitcad.arrays.crosstalk import crosstalk, heat_map_svg, patch_map_svg
 from unitcad.arrays.patch import patch_moulds, patch_parts
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
+from unitcad.lab import measure_command
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measure_command import charts_of
 from unitcad.lab.measuring import measure
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.server import serve
@@ -227,9 +227,8 @@ def test_a_campaign_opens_its_decay(tmp_path):
     with serving(tmp_path, str(CAMPAIGN)) as own:
         status, content, headers = own.send("/")
     assert status == 200
-    charts = charts_of(measure(read_campaign(CAMPAIGN), CAMPAIGN.parent))
-    decay = next(svg for name, svg in charts.items() if name.startswith("decay"))
-    assert decay[decay.index("<svg") :].strip() in content.decode()
+    made = measure_command.page(measure(read_campaign(CAMPAIGN), CAMPAIGN.parent))
+    assert made[made.index("<h2>Levels") :] in content.decode()
     assert "frame-ancestors 'none'" in headers["content-security-policy"]
     assert f"Measured from {CAMPAIGN.resolve()}" in content.decode()
     assert list(tmp_path.iterdir()) == []

@@ -18,7 +18,6 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
@@ -54,7 +53,6 @@ __all__ = [
     "TissueEntry",
     "Value",
     "choose",
-    "figures",
     "materials",
     "measurements",
     "moduli_by_source",
@@ -218,11 +216,6 @@ def moduli_by_source() -> dict[str, dict[str, float]]:
 def measurements() -> Measurements:
     """Return the paper's measured amplitudes at the edge, as printed."""
     return msgspec.convert(_raw("measurements.toml"), Measurements)
-
-
-def figures() -> dict[str, Path]:
-    """Return the digitised figures in the catalogue by name: CSV files of unit, distance_mm, value, error, source."""
-    return {file.stem: file for file in sorted((Path(__file__).parent / "figures").glob("*.csv"))}
 
 
 def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:

@@ -56,13 +56,11 @@ def chart(
     log_x: bool = False,
     log_y: bool = False,
     shaded: tuple[float, float] | None = None,
-    shaded_name: str = "",
     x_range: tuple[float, float] | None = None,
 ) -> str:
     """Return the chart as an SVG document. Points that an axis can't show are skipped.
 
-    `shaded` marks a range of x, which the legend calls `shaded_name`; `x_range` is the range of a linear axis of x, by
-    default that of the series.
+    `shaded` marks a range of x; `x_range` is the range of a linear axis of x, by default that of the series.
     """
     right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
     kept = [(one, *_kept(one, log_x, log_y)) for one in series]
@@ -85,8 +83,6 @@ def chart(
         words = legend(right + 30, y, one.name)
         parts += words
         y += 15 * len(words) + 4
-    if shaded and shaded_name:
-        parts += [_box(right + 10, y - 10, 14, 12), *legend(right + 30, y, shaded_name)]
     return page(WIDTH, HEIGHT, parts)
 
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from fnmatch import fnmatchcase
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import msgspec
 from msgspec import Meta
 
 from unitcad.catalogue.entries import between
@@ -47,8 +43,8 @@ class SensorTable(Table, frozen=True, kw_only=True):
     ] = None
 
 
-class RecordingSettings(Table, frozen=True, kw_only=True):
-    """Settings of recordings, for what their files do not state."""
+class RecordingTable(Table, frozen=True, kw_only=True):
+    """Settings of all records, for what their files do not state."""
 
     rate_hz: Annotated[Rate | None, Meta(description="samples per second, if the files do not state it")] = None
     channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
@@ -60,37 +56,6 @@ class RecordingSettings(Table, frozen=True, kw_only=True):
     )
     decimal: Annotated[DecimalSign | None, Meta(description="decimal sign; default: found in the file")] = None
     skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning of a file")] = None
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """The settings that are given."""
-        return {key: one for key in _SETTINGS if (one := getattr(self, key)) is not None}
-
-
-_SETTINGS = RecordingSettings.__struct_fields__
-
-
-class RecordingOverride(RecordingSettings, frozen=True, kw_only=True):
-    """Settings of some records; they override [recording]."""
-
-    records: Annotated[Records, Meta(description="names of records, or patterns such as motor-*.mat")]
-
-    def matching(self, names: Iterable[str], *patterns: str) -> list[str]:
-        """Return the names that the records name, or some of their patterns do."""
-        patterns = patterns or self.records
-        return [name for name in names if any(one == name or fnmatchcase(name, one) for one in patterns)]
-
-
-class RecordingTable(RecordingSettings, frozen=True, kw_only=True):
-    """Settings of all records."""
-
-    override: Annotated[tuple[RecordingOverride, ...], Meta(max_length=100)] = ()
-
-
-class BlankTable(Table, frozen=True, kw_only=True):
-    """Records with the motor off. They show the mains of the sensor."""
-
-    records: Annotated[Records, Meta(description="records with the motor off")] = ()
 
 
 class PointTable(Table, frozen=True, kw_only=True):
@@ -116,7 +81,6 @@ class Campaign(Table, frozen=True, kw_only=True):
     sensor: SensorTable
     recording: RecordingTable = RecordingTable()
     motor_sensor: SensorTable | None = None
-    blank: BlankTable = BlankTable()
     chain: ChainTable = ChainTable()
     unit: Annotated[tuple[UnitTable, ...], Meta(min_length=1, description="one [[unit]] table or more")]
 
@@ -156,19 +120,16 @@ def check_files(campaign: Campaign, folder: Path) -> None:
     """Check every name of a campaign with files in or below `folder`, without reading a record.
 
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
-    one unit by its path or its bytes, a [[recording.override]] of no record.
+    one unit by its path or its bytes.
     """
-    blanks = [(f"blank.records.{i}", name) for i, name in enumerate(campaign.blank.records)]
     by_unit = []
     for i, unit in enumerate(campaign.unit):
         places = {"reference": unit.reference, "edge": unit.edge}
         places |= {f"point.{k}.records": point.records for k, point in enumerate(unit.point)}
         by_unit.append([(f"unit.{i}.{at}.{k}", name) for at, names in places.items() for k, name in enumerate(names)])
-    every = [*blanks, *(one for records in by_unit for one in records)]
-    _check_overrides(campaign.recording, list(dict.fromkeys(name for _, name in every)))
     for i, unit in enumerate(campaign.unit):
         source_file(unit, folder, f"unit.{i}")
-    for field, name in every:
+    for field, name in chain.from_iterable(by_unit):
         expect_ending(file_of(folder, name, field), field)
     for records in by_unit:
         sizes = [(folder / name).stat().st_size for _, name in records]
@@ -179,54 +140,3 @@ def check_files(campaign: Campaign, folder: Path) -> None:
                 if seen.setdefault(key, field) != field:
                     limit = f"is the record of {seen[key]} again; a repeat is a recording of its own"
                     raise Refusal(field, name, limit)
-
-
-_TIME_KEYS = ("rate_hz", "time_column", "time_unit")
-"""Keys that say the same of a record: one of them in `[[recording.override]]` sets aside those of `[recording]`."""
-
-
-def recording_of(table: RecordingTable, name: str) -> RecordingTable:
-    """Return the settings of a record: `table` with the values of the [[recording.override]] that names it."""
-    given = next((one.given for one in table.override if one.matching([name])), {})
-    if "rate_hz" in given or "time_column" in given:
-        given = dict.fromkeys(_TIME_KEYS) | given
-    return msgspec.structs.replace(table, override=(), **given)
-
-
-@contextmanager
-def own_keys(table: RecordingTable, name: str) -> Iterator[None]:
-    """Let a refusal of a key of `[recording]` name the [[recording.override]] of the record, or the one to add."""
-    try:
-        yield
-    except Refusal as refusal:
-        key = refusal.field.removeprefix("recording.")
-        if refusal.field == key:
-            raise
-        field, limit = refusal.field, f"{refusal.limit}; [[recording.override]] sets it for some records only"
-        for i, own in enumerate(table.override):
-            if own.matching([name]) and key in own.given:
-                field, limit = f"recording.override.{i}.{key}", refusal.limit
-        raise type(refusal)(field, refusal.value, limit, refusal.nearest) from None
-
-
-def _check_overrides(table: RecordingTable, names: list[str]) -> None:
-    """Refuse a [[recording.override]] that sets nothing, that names no record of the campaign, or one of another's."""
-    taken: dict[str, int] = {}
-    for i, own in enumerate(table.override):
-        field = f"recording.override.{i}"
-        if not own.records:
-            raise Refusal(f"{field}.records", [], "names no record")
-        if not own.given:
-            raise Refusal(field, None, f"sets nothing for its records: {', '.join(_SETTINGS)}")
-        if own.motor_channel is not None and table.motor_channel is None:
-            raise Refusal(f"{field}.motor_channel", own.motor_channel, "needs recording.motor_channel")
-        for k, pattern in enumerate(own.records):
-            found = own.matching(names, pattern)
-            if not found:
-                close = difflib.get_close_matches(pattern, names, n=1)
-                limit = "names no record of the campaign"
-                raise Refusal(f"{field}.records.{k}", pattern, limit, close[0] if close else None)
-            for name in found:
-                if taken.setdefault(name, i) != i:
-                    limit = f"names {name}, which recording.override.{taken[name]} does too"
-                    raise Refusal(f"{field}.records.{k}", pattern, limit)

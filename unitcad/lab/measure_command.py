@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from html import escape
-from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,26 +24,21 @@ from unitcad.export.chart import Series, chart
 from unitcad.files import sha256
 from unitcad.lab import measuring
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.chains import Chain
-from unitcad.lab.measuring import Measured, PlaceLevel
+from unitcad.lab.measuring import Measured
 from unitcad.lab.record import RULES, RecordResult
 from unitcad.spec.toml import text_of
 
 MEASURED = "measured.toml"
-OURS = re.compile(r"measured\.toml|measure\.(json|html)|record-\d+-(time|periods|spectrum)\.svg|decay-\d+\.svg")
-"""Names of the files that a run writes, and removes if a former run left more of them."""
 
 
 def write(result: Measured, folder: Path) -> None:
-    """Write all files of a result into a folder, in place of a former run's; measured.toml last. Raises OSError."""
-    charts = charts_of(result)
+    """Write all files of a result into a folder, measured.toml last. Raises OSError."""
     texts = {
         "measure.json": json.dumps(as_data(result), indent=1, allow_nan=False) + "\n",
-        **charts,
-        "measure.html": page(result, charts),
+        "measure.html": page(result),
         MEASURED: text_of(measured_table(result)),
     }
-    files.replace_all(folder, {name: text.encode() for name, text in texts.items()}, MEASURED, OURS)
+    files.replace_all(folder, {name: text.encode() for name, text in texts.items()}, MEASURED)
 
 
 def _each_record(result: Measured) -> Iterator[tuple[str, RecordResult]]:
@@ -88,19 +82,12 @@ def measured_table(result: Measured) -> dict[str, Any]:
 
 def as_data(result: Measured) -> dict[str, Any]:
     """Return everything as JSON-ready data."""
-    hertz = result.campaign.chain.mains_hz
-
-    def mains(blank: tuple[tuple[int, float], ...]) -> list[dict[str, float]]:
-        return rounded([{"hz": order * hertz, "amplitude": value} for order, value in blank], 6)
-
     return {
         "campaign": msgspec.to_builtins(result.campaign),
         "levels": measured_table(result)["level"],
         "records": [{"unit": unit, **record.as_dict()} for unit, record in _each_record(result)],
         "findings": [finding.as_dict() for finding in result.findings],
         "assumed": result.assumed,
-        "mains_of_blank": mains(result.mains),
-        "mains_of_blank_motor": mains(result.motor_mains),
     }
 
 
@@ -141,16 +128,14 @@ h1{font-size:1.4rem}table{font-size:13px}td,th{padding:.15rem .3rem}td:first-chi
 figure{overflow-x:auto}svg{max-width:none;width:31rem}}"""
 
 
-def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
-    """Return the page as HTML; `charts` are SVG documents by file name, `lead` is HTML that comes first."""
+def page(result: Measured, lead: str = "") -> str:
+    """Return the page as HTML; `lead` is HTML that comes first."""
     found = "".join(
         f'<li class="{one.severity}"><b>{one.code}</b> {escape(one.where)}: {escape(one.message)}. '
         f"{escape(one.as_dict()['fix'])}</li>"
         for one in result.findings
     )
-    figures = {"decay": "", "record": ""}
-    for name, svg in charts.items():
-        figures[name.partition("-")[0]] += f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>"
+    drawn = _figures(svg for _, record in _each_record(result) for svg in _record_charts(record))
     levels = []
     for one in result.levels:
         level = one.level
@@ -172,11 +157,11 @@ def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
         f"{lead}<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
         + (_table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels) if levels else _NO_LEVEL)
         + "".join(f"<p>{escape(text)}.</p>" for text in _assumed(result))
-        + f"{figures['decay']}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        + f"{_figures(_decay_charts(result))}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
         "<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
         "comes from the scatter of the repeats.</p>"
         + _table((*head, *(f"gain of {name}" for name in gains), "SHA-256"), records)
-        + f"<h2>Charts of the records</h2>{figures['record']}",
+        + f"<h2>Charts of the records</h2>{drawn}",
     )
 
 
@@ -212,50 +197,25 @@ def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return f'<div class="wide"><table><tr>{cells}</tr>{body}</table></div>'
 
 
-SHOWN_S = 0.1
-"""Seconds of a record's middle that a chart shows."""
 STRETCHES = 100
 """Parts of a record of which its chart shows the least and the largest value."""
 BESIDE_HZ = 30.0
 """Width of a spectrum to either side of the line: one multiple of 50 Hz at least."""
-APART = 0.008
-"""Part of the axis by which the levels of two chains are drawn apart, so that no bar covers another."""
 LEAST_WIDE_MM = 10.0
-"""Smallest span of the axis of distances, against which APART is no distance."""
+"""Smallest span of the axis of distances."""
 
 
-def charts_of(result: Measured) -> dict[str, str]:
-    """Return the charts as SVG by file name."""
-    out = {}
-    for number, (_, record) in enumerate(_each_record(result), 1):
-        time, samples = record.picture[:2]
-        unit = f"signal, {record.unit}"
-        step = max(len(time) // STRETCHES, 1)
-        count = len(time) // step
-        folded = samples[: count * step].reshape(count, step)
-        middles = time[step // 2 : count * step : step][:count]
-        ends = {"largest": np.fmax.reduce(folded, axis=1), "least": np.fmin.reduce(folded, axis=1)} if count else {}
-        whole = [Series(f"{name} of each stretch", middles, values) for name, values in ends.items()]
-        middle = len(time) // 2
-        half = max(int(SHOWN_S / 2 * len(time) / max(time[-1], 1e-9)), 8) if len(time) else 0
-        part = slice(max(middle - half, 0), middle + half)
-        periods = [Series("signal", time[part], samples[part])]
-        stem = f"record-{number:02d}"
-        out[f"{stem}-time.svg"] = chart(whole, f"{record.file}: whole record", "time, s", unit)
-        out[f"{stem}-periods.svg"] = chart(periods, f"{record.file}: middle", "time, s", unit)
-        out[f"{stem}-spectrum.svg"] = _spectrum_chart(record, result.chains)
-    for i, unit in enumerate(result.campaign.unit, 1):
-        levels = [one for one in result.levels if one.unit == unit.name]
-        if levels:
-            out[f"decay-{i:02d}.svg"] = _decay_chart(unit.name, levels)
-    return out
-
-
-def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
-    """Chart the spectrum near the line with the zeros of the chains' combs, or all of it without a sure line."""
-    frequency, size = record.picture[2:]
-    hertz = record.frequency_hz
-    if hertz and not any(one.code == "L117" for one in record.findings):
+def _record_charts(record: RecordResult) -> list[str]:
+    """Chart the whole record, and its spectrum near the line, or all of it without a line, as SVG."""
+    time, samples, frequency, size = record.picture
+    unit = f"signal, {record.unit}"
+    step = max(len(time) // STRETCHES, 1)
+    count = len(time) // step
+    folded = samples[: count * step].reshape(count, step)
+    middles = time[step // 2 : count * step : step][:count]
+    ends = {"largest": np.fmax.reduce(folded, axis=1), "least": np.fmin.reduce(folded, axis=1)} if count else {}
+    whole = [Series(f"{name} of each stretch", middles, values) for name, values in ends.items()]
+    if hertz := record.frequency_hz:
         near = np.abs(frequency - hertz) < BESIDE_HZ
         frequency, size = frequency[near], size[near]
     floor = float(np.median(size)) / 10 if len(size) and np.median(size) > 0 else 1e-12
@@ -263,37 +223,29 @@ def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
     series = [Series("spectrum (Hann)", frequency[kept], size[kept])]
     if hertz:
         series.append(Series("fitted line", [hertz], [float(np.interp(hertz, frequency, size))], points=True))
-    for chain in chains:
-        if chain.zeros_hz and len(frequency):
-            first = np.ceil(frequency[0] / chain.zeros_hz) or 1.0
-            zeros = np.arange(first * chain.zeros_hz, frequency[-1] + 1e-9, chain.zeros_hz)
-            bars = [(floor, max(float(size.max()), floor))] * len(zeros)  # a sensor that is off has zeros only
-            name = f"zeros of {chain.name}'s comb"
-            series.append(Series(name, zeros, np.full(len(zeros), floor), points=True, bars=bars))
-    filtered = next((chain for chain in chains if chain.pass_hz), None)
-    return chart(
-        series, f"{record.file}: spectrum", "frequency, Hz", f"amplitude, {record.unit}", log_y=True,
-        shaded=filtered.pass_hz if filtered else None,
-        shaded_name=f"pass band of {filtered.name}" if filtered else "",
-        x_range=(float(frequency[0]), float(frequency[-1])) if len(frequency) else None,
-    )  # fmt: skip
+    span = (float(frequency[0]), float(frequency[-1])) if len(frequency) else None
+    amplitude = f"amplitude, {record.unit}"
+    return [
+        chart(whole, f"{record.file}: whole record", "time, s", unit),
+        chart(series, f"{record.file}: spectrum", "frequency, Hz", amplitude, log_y=True, x_range=span),
+    ]
 
 
-def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
-    """Chart the levels over the distance, a colour for each chain."""
-    kinds = {
-        key: list(there) for key, there in groupby(sorted(levels, key=lambda one: one.chain), lambda one: one.chain)
-    }
-    wide = max(LEAST_WIDE_MM, *(one.distance_mm for one in levels))
-    series = []
-    for i, (key, there) in enumerate(kinds.items()):
-        there.sort(key=lambda one: one.distance_mm)
-        shift = APART * wide * (i - (len(kinds) - 1) / 2)
-        x = [one.distance_mm + shift for one in there]
-        bars = [(one.level.low, one.level.high) for one in there]
-        series.append(Series(f"{key}, 95 % interval", x, [one.level.value for one in there], points=True, bars=bars))
-    title = f"{name}: level over the distance from the edge"
-    return chart(series, title, "distance, mm", "level", log_y=True, x_range=(-0.03 * wide, 1.03 * wide))
+def _decay_charts(result: Measured) -> Iterator[str]:
+    """Chart each unit's levels of the first chain over the distance, as SVG."""
+    for unit in result.campaign.unit:
+        levels = [one for one in result.levels if (one.unit, one.chain) == (unit.name, result.chains[0].name)]
+        if levels:
+            x = [one.distance_mm for one in levels]
+            bars = [(one.level.low, one.level.high) for one in levels]
+            wide = max(LEAST_WIDE_MM, *x)
+            series = [Series("95 % interval", x, [one.level.value for one in levels], points=True, bars=bars)]
+            title = f"{unit.name}: level over the distance from the edge"
+            yield chart(series, title, "distance, mm", "level", log_y=True, x_range=(-0.03 * wide, 1.03 * wide))
+
+
+def _figures(charts: Iterable[str]) -> str:
+    return "".join(f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>" for svg in charts)
 
 
 def measured(path: bytes) -> bytes:
@@ -308,7 +260,7 @@ def measured(path: bytes) -> bytes:
         f"<p>Measured from {escape(str(file))} as it is saved. Its recordings are files that it names by "
         f"patterns, so it has no form here: change the file in an editor, then {_AGAIN}.</p>"
     )
-    return msgspec.json.encode({"page": page(result, charts_of(result), lead)})
+    return msgspec.json.encode({"page": page(result, lead)})
 
 
 def refusal_page(file: Path, why: str) -> str:

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.stats import t
 
 from unitcad.errors import Refusal
 from unitcad.files import sha256
@@ -25,12 +24,9 @@ from unitcad.lab.campaign import (
     SensorTable,
     UnitTable,
     check_files,
-    own_keys,
-    recording_of,
 )
-from unitcad.lab.chains import Chain, Mains, chains_of
-from unitcad.lab.chains.line import mains_columns, mains_orders, solve, trend_columns
-from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, finding, measure_record, open_signal
+from unitcad.lab.chains import Chain, chains_of
+from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, finding, measure_record
 from unitcad.lab.unit_files import source_file
 
 COVERAGE = 0.95
@@ -57,12 +53,11 @@ class Level:
     scatter: float
 
 
-def level(amplitudes: Sequence[float], references: Sequence[float] | None = None, shared: float = 0.0) -> Level:
+def level(amplitudes: Sequence[float], references: Sequence[float] | None = None) -> Level:
     """Return the level of repeated amplitudes over repeated amplitudes of the motor, measured apart.
 
     Without `references` the amplitudes are ratios to a motor that was recorded at the same time. The two scatters may
-    differ (Welch 1947, Satterthwaite 1946). `shared` is a relative standard uncertainty that all repeats have in
-    common. Raises Refusal for fewer than three repeats of either.
+    differ (Welch 1947, Satterthwaite 1946). Raises Refusal for fewer than three repeats of either.
     """
 
     sides = []
@@ -80,7 +75,7 @@ def level(amplitudes: Sequence[float], references: Sequence[float] | None = None
     freedom = sum(parts) ** 2 / weights if weights > 0 else float(sum(counts) - len(counts))
     log = means[0] - sum(means[1:])
     quantile = (1 + COVERAGE) / 2
-    half = math.hypot(float(t.ppf(quantile, freedom)) * math.sqrt(sum(parts)), float(norm.ppf(quantile)) * shared)
+    half = float(t.ppf(quantile, freedom)) * math.sqrt(sum(parts))
     ends = (math.exp(log), math.exp(log - half), math.exp(log + half))
     return Level(*ends, (counts[0], counts[-1]), math.sqrt(max(variances)))
 
@@ -98,19 +93,13 @@ class PlaceLevel:
 
 @dataclass(frozen=True)
 class Measured:
-    """A campaign's result: levels, records by unit, findings, hashes of its other files.
-
-    `mains` and `motor_mains` are the mains' amplitudes by multiple in motor-off records of the unit's sensor and of the
-    motor's, in its unit.
-    """
+    """A campaign's result: levels, records by unit, findings, hashes of its other files."""
 
     campaign: Campaign
     levels: tuple[PlaceLevel, ...]
     records: dict[str, tuple[RecordResult, ...]]
     findings: tuple[LabFinding, ...]
     specs: dict[str, str]
-    mains: tuple[tuple[int, float], ...]
-    motor_mains: tuple[tuple[int, float], ...]
 
     @property
     def chains(self) -> tuple[Chain, ...]:
@@ -130,50 +119,20 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     """
     check_files(campaign, folder)
     stated: dict[SensorTable, tuple[str, str]] = {}
-    mains = _mains_of_blanks(campaign, folder, stated)
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
-    specs = {name: sha256(folder / name) for name in campaign.blank.records}
+    specs: dict[str, str] = {}
     for i, unit in enumerate(campaign.unit):
         if name := source_file(unit, folder, f"unit.{i}"):
             specs[name] = sha256(folder / name)
-        records[unit.name] = tuple(one := _records(unit, campaign, folder, mains, stated, say))
+        records[unit.name] = tuple(one := _records(unit, campaign, folder, stated, say))
         findings += [finding for record in one for finding in record.findings]
         for role, distance, _ in sorted(_places(unit), key=itemgetter(1)):
             more, said = _levels(unit, role, distance, one, campaign)
             levels += more
             findings += said
-    return Measured(campaign, tuple(levels), records, tuple(findings), specs, mains[0].blank, mains[1].blank)
-
-
-def _mains_of_blanks(
-    campaign: Campaign, folder: Path, stated: dict[SensorTable, tuple[str, str]]
-) -> tuple[Mains, Mains]:
-    """Return the mains of the unit's sensor and of the motor's, by multiple the largest amplitude of all records.
-
-    The motor's are of its channel. If its sensor records alone, they are the unit's if both have one sensor, otherwise
-    not known. Raises Refusal for a record that can't be read.
-    """
-    hertz, paired = campaign.chain.mains_hz, campaign.recording.motor_channel is not None
-    sensors = _sensors(campaign)
-    largest: tuple[dict[int, float], ...] = tuple({} for _ in sensors)
-    for name in campaign.blank.records:
-        with own_keys(campaign.recording, name):
-            signal = open_signal(folder / name, recording_of(campaign.recording, name), sensors, name)
-        expect_one_unit(stated, signal.units, sensors, name)
-        time = np.arange(len(signal.samples)) / signal.rate
-        orders = mains_orders(hertz, signal.rate, (), float(time[-1]))
-        columns = np.concatenate([mains_columns(time, hertz, orders), trend_columns(time)])
-        for by_order, samples in zip(largest, signal.samples.T, strict=True):
-            good = np.isfinite(samples)
-            values = solve(columns, np.where(good, samples, 0.0), good)[0]
-            for i, order in enumerate(orders):
-                by_order[order] = max(by_order.get(order, 0.0), float(np.hypot(*values[2 * i : 2 * i + 2])))
-    unit, *motor = (Mains(hertz, tuple(sorted(found.items()))) for found in largest)
-    if not paired:
-        motor = [unit if campaign.motor_sensor in (None, campaign.sensor) else Mains(hertz)]
-    return unit, motor[0]
+    return Measured(campaign, tuple(levels), records, tuple(findings), specs)
 
 
 def _sensors(campaign: Campaign) -> tuple[SensorTable, ...]:
@@ -192,7 +151,6 @@ def _records(
     unit: UnitTable,
     campaign: Campaign,
     folder: Path,
-    mains: tuple[Mains, Mains],
     stated: dict[SensorTable, tuple[str, str]],
     say: Callable[[str], None],
 ) -> list[RecordResult]:
@@ -201,15 +159,13 @@ def _records(
     band = campaign.chain.band_hz
     out: list[RecordResult] = []
 
-    def add(
-        name: str, role: str, sensors: tuple[SensorTable, ...], own: tuple[Mains, ...], band: tuple[float, float]
-    ) -> None:
+    def add(name: str, role: str, sensors: tuple[SensorTable, ...], band: tuple[float, float]) -> None:
         say(name)
-        out.append(measure_record(folder / name, role, campaign, sensors, own, band, name))
+        out.append(measure_record(folder / name, role, campaign, sensors, band, name))
         expect_one_unit(stated, out[-1].units, sensors, name)
 
     for name in unit.reference:
-        add(name, "reference", (motor,), mains[1:], band)
+        add(name, "reference", (motor,), band)
     hertz = [record.frequency_hz for record in out if record.usable]
     if hertz:
         middle = float(np.median(hertz))
@@ -217,7 +173,7 @@ def _records(
     sensors = _sensors(campaign)
     for role, _, names in _places(unit):
         for name in names:
-            add(name, role, sensors, mains, band)
+            add(name, role, sensors, band)
     return out
 
 
@@ -232,7 +188,6 @@ def _levels(
     for side in (there,) if paired else (there, motor):
         if len(side) < LEAST_REPEATS:
             return [], [finding("L112", where, f"{len(side)} usable records; a level needs {LEAST_REPEATS}")]
-    shared = max(record.shared for record in (*there, *motor))
     base = there if paired else motor
     middle = float(np.median([one.frequency_hz for one in base]))
     near = [one for one in there if abs(one.frequency_hz - middle) < MOST_APART * middle]
@@ -252,13 +207,9 @@ def _levels(
             message = f"{count} usable records; a level needs {LEAST_REPEATS}"
             findings.append(finding("L112", f"{where}, {hertz:.2f} Hz, by {chain.name}", message))
             continue
-        result = level(values, None if paired else below, shared)
+        result = level(values, None if paired else below)
         levels.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
         if result.scatter > MOST_DISAGREEMENT:
             message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
             findings.append(finding("L109", where, message))
-    for one, other in combinations(levels, 2):
-        if one.level.high < other.level.low or other.level.high < one.level.low:
-            said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
-            findings.append(finding("L115", where, said))
     return levels, findings

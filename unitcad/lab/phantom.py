@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
@@ -66,8 +66,6 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = None
     most_echo_pct: Annotated[float, between(0.5, 50, "largest echo of the walls at the last point, in percent")] = 5.0
     plate_thickness_mm: Annotated[float, between(2, 20, "thickness of the acrylic plate below")] = 5.0
-    stage_pitch_mm: Annotated[float, between(5, 50, "pitch of the table's threaded holes")] = 25.0
-    stage_bolt_mm: Annotated[float, between(2, 12, "thread of the table's holes")] = 6.0
     printer: Annotated[str, Meta(description="printer of the catalogue")] = "fdm-0.4"
     waste: Annotated[float, between(0, 2, "extra mix, as a fraction")] = 0.1
     scale_resolution_g: Annotated[float, between(1e-4, 10, "smallest step of the scale")] = 0.1
@@ -173,8 +171,8 @@ def expect_apart(points_mm: Sequence[float]) -> None:
             raise Refusal("points_mm", list(points_mm), limit)
 
 
-WALL, FLOOR, LID, HOLDER = 4.0, 3.0, 4.0, 6.0
-"""Walls around the cavity at its rim, the tray's floor, thickness of lid and holder, mm."""
+WALL, FLOOR, LID = 4.0, 3.0, 4.0
+"""Walls around the cavity at its rim, the tray's floor, thickness of the lid, mm."""
 DRAFT_DEG = 1.0
 EAR, EAR_HALF, EAR_AT = 14.0, 9.0, 0.65
 """Length of an ear, its half width, and its middle as a part of the half side, mm."""
@@ -182,12 +180,10 @@ PEG_RADIUS, PEG_FROM_WALL = 3.0, 8.0
 PUSH_RADIUS = 8.0
 PLATE_PLAY = 0.3
 """Of the plate in the tray, per side, mm."""
-FENCE, FENCE_LONG, FENCE_HIGH = 4.0, 12.0, 10.0
 _COLOURS = {
     "base": (0.76, 0.76, 0.76),
     "frame": (0.96, 0.83, 0.66),
     "lid": (0.55, 0.75, 0.55),
-    "holder": (0.6, 0.66, 0.8),
 }
 _PLATE, _BLADE = (0.8, 0.9, 0.95), (0.90, 0.30, 0.30)
 
@@ -251,7 +247,7 @@ def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
 
 
 def pieces(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
-    """Draw tray, plate, frames (skin first), lid, blade and holder as assembled."""
+    """Draw tray, plate, frames (skin first), lid and blade as assembled."""
     frames = []
     for step, (high, low) in enumerate(pairwise(size.tops)):
         opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
@@ -266,7 +262,6 @@ def pieces(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
         *frames,
         Body("lid", "tool", "lid", _lid(phantom, size), _COLOURS["lid"]),
         Body("blade", "tool", "blade", blade, _BLADE, upside_down=True),
-        Body("holder", "tool", "holder", _holder(phantom, size), _COLOURS["holder"]),
     ]
 
 
@@ -307,32 +302,6 @@ def _lid(phantom: PhantomTable, size: BoxLengths) -> Shape:
     points = [moved(cylinder(POINT_RADIUS, low - 1.0, high + 1.0), seat + one, 0.0) for one in phantom.points_mm]
     seat_hole = cylinder(seat, low - 1.0, high + 1.0)
     return cut(_outline(size, low, high), [seat_hole, *points, *_peg_holes(size, low, high)])
-
-
-def _holder(phantom: PhantomTable, size: BoxLengths) -> Shape:
-    """Draw the plate that fixes the tray on a table with threaded holes: fences at its corners, four bolt holes."""
-    low, high = size.bottom - HOLDER, size.bottom
-    x_bolt, y_bolt = bolts(phantom, size)
-    face, beside = size.outer + 0.3, phantom.stage_bolt_mm + 4.0
-    half_x, half_y = max(face + FENCE, x_bolt + beside), y_bolt + beside
-    half, middle = (FENCE + FENCE_LONG) / 2, face + (FENCE - FENCE_LONG) / 2
-    along = box(-half, half, -FENCE / 2, FENCE / 2, high - 1.0, high + FENCE_HIGH)
-    across = box(-FENCE / 2, FENCE / 2, -half, half, high - 1.0, high + FENCE_HIGH)
-    fences = zip(
-        _at_corners(along, middle, face + FENCE / 2), _at_corners(across, face + FENCE / 2, middle), strict=True
-    )
-    solids = [box(-half_x, half_x, -half_y, half_y, low, high), *chain.from_iterable(fences)]
-    window = Extrude(_square(0.75 * size.inner), low - 1.0, high + 1.0)
-    hole = cylinder(phantom.stage_bolt_mm / 2 + 0.3, low - 1.0, high + 1.0)
-    return cut(union(solids), [window, *_at_corners(hole, x_bolt, y_bolt)])
-
-
-def bolts(phantom: PhantomTable, size: BoxLengths) -> tuple[float, float]:
-    """Return x and y of the holder's bolt holes: on the table's pitch, beyond the fences along y."""
-    half = phantom.stage_pitch_mm / 2
-    needed = size.outer + 0.3 + FENCE + phantom.stage_bolt_mm + 1.0
-    across = math.floor(0.8 * size.outer / half)
-    return max(across, 1) * half, math.ceil(needed / half) * half
 
 
 ACRYLIC = {"density_kg_m3": 1190.0, "youngs_modulus_kpa": 3e6, "poisson_ratio": 0.37, "loss_factor": 0.05}

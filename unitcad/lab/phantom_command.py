@@ -29,7 +29,6 @@ from unitcad.lab.phantom import (
     SEGMENTS,
     THINNER_MM,
     PhantomSet,
-    bolts,
     load_phantom,
     phantom_set,
     printed_pieces,
@@ -197,12 +196,10 @@ def bill(phantom: PhantomSet) -> list[Item]:
         "tape or clips": "hold the frames down",
         "pen": "marks the skin through the lid",
         "thin blade": "loosens the slab from the wall",
-        "rubber band": "fixes the tray in its holder",
         "emery paper, fine": "roughens the plate",
         "silicone primer": "optional: bonds the lowest layer to the plate, in place of roughening it",
     }
     rows += [(name, 1, "piece", "bought", note) for name, note in bought.items()]
-    rows.append(("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
     return [Item(*row) for row in rows]
 
 
@@ -316,12 +313,7 @@ def _release(phantom: PhantomSet) -> Iterator[str]:
         "notch is the point at 0 mm, and the points at "
         f"{', '.join(f'{d:g}' for d in sorted(phantom.table.points_mm))} mm from its edge. Take the lid off."
     )
-    x, y = bolts(phantom.table, phantom.size)
-    yield (
-        "Measure in the box: its walls count in the design. The holder is bolted to the table by four "
-        f"M{phantom.table.stage_bolt_mm:g} at {2 * x:g} x {2 * y:g} mm; the tray is between its fences, fixed "
-        "down by a rubber band."
-    )
+    yield "Measure in the box: its walls count in the design. Fix the tray on the table with clamps at its ears."
     yield (
         "To take the slab out: lift the frames off, run a thin wet blade round the wall, and push the plate up "
         "through the four holes of the tray, evenly. The cavity widens upwards. Never pull the silicone: it is "
@@ -404,7 +396,7 @@ def box_picture(phantom: PhantomSet) -> bytes:
     def place(body: Body) -> tuple[float, bool]:
         """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
         _, _, low, _, _, high = bounds(realise(body.shape, SEGMENTS))
-        return (low if body.kind in ("base", "holder") else high, body.kind == "layer")
+        return (low if body.kind == "base" else high, body.kind == "layer")
 
     bodies = sorted([*shown, *phantom.layers], key=place)
     parts, height = [], 0.0
@@ -492,7 +484,7 @@ def phantom(
 ) -> None:
     """Make a skin phantom to cast, and its response.
 
-    Recipe, box with a screed frame a layer, lid, stage holder, procedure, bench sheet, the tissue for
+    Recipe, box with a screed frame a layer, lid, procedure, bench sheet, the tissue for
     an estimate, and the response to expect. The last line printed is the folder.
     """
 

@@ -12,8 +12,8 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, own_keys, recording_of
-from unitcad.lab.chains import LineFit, Mains, chains_of
+from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable
+from unitcad.lab.chains import LineFit, chains_of
 from unitcad.lab.chains.line import clip_level, fit_line, spectrum
 from unitcad.lab.readers import TIME_NAMES, UNITS, Layout, Recording, open_recording, plain, ratio, seconds, to_si
 from unitcad.meshcheck.rules.registry import Rule
@@ -55,29 +55,23 @@ RULES = {
             again as before. Fix: Repeat, five times or more.""",
             """L110 error: drop-outs
             More than a tenth of the samples were excluded: more than a robust fit bears. Example: A
-            vibrometer on bare skin. Fix: Put retroreflective tape on the point.""",
+            vibrometer on bare skin, a motor that runs for less than half of the record. Fix: Put retroreflective
+            tape on the point, or cut the record to the part in which the motor runs.""",
             """L111 error: no line
             The band has no line above five times its uncertainty. Example: The motor did not run.
-            Fix: Repeat.""",
+            Fix: Repeat, or set chain.band_hz to the motor's frequency.""",
             """L112 error: too few repeats
             Fewer than three usable records are left: no level is given. Example: One of three is
             clipped. Fix: Repeat.""",
             """L114 warning: not fit for a chain
             The chain gives no amplitude of a record with drop-outs, missing samples or too few samples.
             Example: The chain bandpass and a spike. Fix: Use the chain line.""",
-            """L115 warning: chains disagree
-            The intervals of two chains do not overlap. Example: Hum that one chain does not remove.
-            Fix: Look at the spectra of the records.""",
             """L116 error: motor and unit at different frequencies
             No line of the unit is within a tenth of the motor's frequency: no level is given.
             Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
-            """L117 error: stronger line outside the band
-            A line outside chain.band_hz is stronger than the one in it, which may be its harmonic.
-            Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
             """L118 warning: low signal to noise
-            The amplitude is less than ten times the standard deviation of the residual; if twice its uncertainty
-            exceeds it, it is an error. Example: A point far from the unit. Fix:
-            Record longer, average more, or a sensor of a smaller range.""",
+            The amplitude is less than ten times the standard deviation of the residual. Example: A point far from
+            the unit. Fix: Record longer, average more, or a sensor of a smaller range.""",
             """L119 warning: missing samples
             Samples are no numbers: empty, or NaN. They are skipped; beyond a tenth of them it is an error. Example: A
             logger that writes NaN while the laser has lost the surface. Fix: Put
@@ -311,7 +305,6 @@ LEAST_OVER_U = 5
 """The strongest of the 400 bins of noise in a band of 190 Hz over 2 s is above 4 in a record of ten, above 5 in few of
 a thousand.
 """
-TREMOR_HZ = 20
 _ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _OF_THE_RATE = ("L102", "L108")
 """Findings of the rate and the span, which unit and motor share."""
@@ -338,7 +331,6 @@ class RecordResult:
     usable: bool = False
     amplitude_um: float = 0.0
     u_um: float = 0.0
-    shared: float = 0.0
     frequency_hz: float = 0.0
     drift: float = 0.0
     snr: float = 0.0
@@ -357,7 +349,7 @@ class RecordResult:
     def as_dict(self) -> dict[str, Any]:
         """Return JSON-ready data, six significant digits; a record that counts for nothing has no uncertainty."""
         data = {key: value for key, value in vars(self).items() if isinstance(value, float | int | str)}
-        data |= {} if self.usable else {"u_um": None, "shared": None}
+        data |= {} if self.usable else {"u_um": None}
         data |= {} if self.frequency_hz else {"amplitude_um": None}
         data |= {
             "length_s": self.length_s,
@@ -373,29 +365,25 @@ def measure_record(
     role: str,
     campaign: Campaign,
     sensors: tuple[SensorTable, ...],
-    mains: tuple[Mains, ...],
     band: tuple[float, float],
     shown: str,
 ) -> RecordResult:
-    """Return a record's figures by every chain of the campaign; `mains` and `sensors` are the unit's, then the motor's.
+    """Return a record's figures by every chain of the campaign; `sensors` are the unit's, then the motor's.
 
     `band` is the band in which its line is searched, in Hz. Raises Refusal for a record that can't be read.
     """
-    with own_keys(campaign.recording, shown):
-        signal = open_signal(path, recording_of(campaign.recording, shown), sensors, shown)
-    chains, mains_hz = chains_of(campaign.chain), campaign.chain.mains_hz
+    signal = open_signal(path, campaign.recording, sensors, shown)
+    chains = chains_of(campaign.chain)
     names = (shown, f"{shown}, motor")[: len(sensors)]
     samples, rate = signal.samples, signal.rate
     frequency, size = spectrum(np.where(np.isfinite(samples[:, 0]), samples[:, 0], 0.0), rate)
     low = frequency <= min(HIGHEST_HZ, rate / 2)
     frequency, size = frequency[low], size[low]
     picture = (np.arange(len(samples)) / rate, samples[:, 0], frequency, size)
-    hertz = _outside(frequency, size, band, mains_hz)
-    hint = f"; the strongest line outside that is at about {hertz:.0f} Hz" if hertz else ""
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
         findings.append(finding("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
-    fits = _fits(samples, rate, band, mains, sensors)
+    fits = _fits(samples, rate, band, campaign.chain.mains_hz, sensors)
     for fit, channel, gaps, where in zip(fits, samples.T, signal.missing, names, strict=True):
         level = fit.clipped if fit else _clipped(channel)
         if level < np.inf:
@@ -410,23 +398,18 @@ def measure_record(
         return replace(none, findings=tuple(findings))
     for each, where in zip(fits, names, strict=True):
         if each is None:
-            message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz{hint}"
+            message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz"
             return replace(none, findings=(*findings, finding("L111", where, message)))
     fit, *motors = (each for each in fits if each)
     motor = motors[0] if motors else None
-    for each, where, known in zip((fit, *motors), names, mains, strict=False):
-        for one in _of_line(each, rate, signal.raw_rate, where, known):
-            if (one.code, where) == ("L111", shown):
-                one = replace(one, message=one.message + hint)
+    for each, where in zip((fit, *motors), names, strict=False):
+        for one in _of_line(each, rate, signal.raw_rate, where):
             if each is fit or one.code not in _OF_THE_RATE:
                 findings.append(one)
     steady, length = fit.end_s - fit.start_s, len(samples) / rate
     if steady < LEAST_STEADY * length and not any(one.severity == "error" for one in findings):
         message = f"steady for {steady:.2f} s of {length:.2f} s; only that part was used"
         findings.append(finding("L107", shown, message))
-    outside = _outside(frequency, size, campaign.chain.band_hz, mains_hz, fit.frequency_hz)
-    if outside is not None:
-        findings.append(finding("L117", shown, f"a stronger line is at about {outside:.0f} Hz, outside chain.band_hz"))
     hertz = fit.frequency_hz
     scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
     factor, ratio, lag = abs(scales[0]), None, None
@@ -458,7 +441,6 @@ def measure_record(
         usable=not any(one.severity == "error" for one in findings),
         amplitude_um=fit.amplitude * factor,
         u_um=fit.u * factor,
-        shared=float(np.hypot(fit.u_mains / fit.amplitude, motor.u_mains / motor.amplitude if motor else 0.0)),
         frequency_hz=hertz,
         drift=fit.drift,
         snr=fit.snr,
@@ -481,18 +463,18 @@ def _fits(
     samples: Floats,
     rate: float,
     band: tuple[float, float],
-    mains: tuple[Mains, ...],
+    mains_hz: float,
     sensors: tuple[SensorTable, ...],
 ) -> list[LineFit | None]:
     """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
     fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
-        fit = fit_line(samples[:, i], rate, band, mains[i], sensors[i].full_scale, fits[0] if fits else None)
+        fit = fit_line(samples[:, i], rate, band, mains_hz, sensors[i].full_scale, fits[0] if fits else None)
         fits.insert(0, fit if fit and fit.amplitude > 0 else None)
     return fits
 
 
-def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Mains) -> list[LabFinding]:
+def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str) -> list[LabFinding]:
     """Return the findings about a single line, in the order of their codes."""
     out = []
 
@@ -502,7 +484,7 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     hertz = fit.frequency_hz
     if fit.masked > MOST_MASKED:
         say("L110", f"{fit.masked:.0%} of the samples were excluded")
-    own = float(np.sqrt(max(fit.u**2 - fit.u_mains**2, 0.0))) if fit.snr < 1 else fit.u_noise
+    own = fit.u if fit.snr < 1 else fit.u_noise
     if fit.amplitude < LEAST_OVER_U * own:  # nothing else can be said of a line that is not there
         say("L111", f"the strongest has {fit.amplitude / own:.1f} times its uncertainty")
         return out
@@ -511,8 +493,7 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     if raw_rate < 4 * hertz:
         say("L102", f"{raw_rate:g} Hz for a line at {hertz:.1f} Hz")
     if fit.mains_hz:
-        known = "its part is in the uncertainty" if mains.blank else "without a [blank] its part is not known"
-        say("L105", f"{hertz:.2f} Hz next to {fit.mains_hz:g} Hz: {known}")
+        say("L105", f"{hertz:.2f} Hz next to {fit.mains_hz:g} Hz: the part of the mains is not known")
     periods = (fit.end_s - fit.start_s) * hertz
     if periods < LEAST_PERIODS:
         severity = "error" if periods < NO_PERIODS else "warning"
@@ -522,34 +503,9 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     if scatter > MOST_SCATTER or fit.drift > MOST_DRIFT:
         severity = "error" if scatter > NO_SCATTER else "warning"
         say("L107", f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}", severity)
-    if 2 * fit.u > fit.amplitude:
-        say("L118", f"twice the uncertainty is {2 * fit.u / fit.amplitude:.1f} times the amplitude", "error")
-    elif fit.snr < LEAST_SNR and scatter <= MOST_SCATTER:  # a modulation is no noise
+    if fit.snr < LEAST_SNR and scatter <= MOST_SCATTER:  # a modulation is no noise
         say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
     return sorted(out, key=lambda one: one.code)
-
-
-def _outside(
-    frequency: Floats, size: Floats, band: tuple[float, float], mains_hz: float, own_hz: float | None = None
-) -> float | None:
-    """Return the frequency of the strongest line outside a band; None if all is noise there.
-
-    `frequency` and `size` are a spectrum. The mains are no line. With `own_hz`, the line in the band, neither are its
-    harmonics, and a weaker one than it is none either.
-    """
-    near = max(1.0, 3 * float(frequency[1] - frequency[0])) if len(frequency) > 1 else 1.0
-    outside = (frequency > TREMOR_HZ) & ((frequency < band[0] - near) | (frequency > band[1] + near))
-    outside &= np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > near
-    least = 0.0
-    if own_hz is not None:
-        own = np.abs(frequency - own_hz) <= near
-        harmonic = np.abs(frequency - own_hz * np.round(frequency / own_hz)) <= near
-        outside &= (frequency < 1.5 * own_hz) | ~harmonic
-        least = size[own].max(initial=0.0) if own.any() else np.inf
-    if not outside.any():
-        return None
-    at = int(np.argmax(np.where(outside, size, 0.0)))
-    return float(frequency[at]) if size[at] > max(8 * float(np.median(size[outside])), least) else None
 
 
 def _clipped(samples: Floats) -> float:

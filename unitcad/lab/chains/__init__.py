@@ -19,24 +19,12 @@ Phase = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
-class Mains:
-    """The mains' frequency in Hz, and by multiple the amplitude that a motor-off record has, in the signal's unit."""
-
-    frequency_hz: float = 50.0
-    blank: tuple[tuple[int, float], ...] = ()
-
-    def amplitude(self, order: int) -> float | None:
-        """Return a multiple's amplitude in the motor-off record; None without such a record."""
-        return dict(self.blank).get(order, 0.0) if self.blank else None
-
-
-@dataclass(frozen=True)
 class LineFit:
     """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
 
-    `u_noise` is the part of `u` from the noise next to the line, `u_mains` the part that every repeat shares.
-    `value` is the complex amplitude against `phase`. `drift` is the range of the frequency over its mean, `snr` the
-    amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
+    `u_noise` is the part of `u` from the noise next to the line. `value` is the complex amplitude against `phase`.
+    `drift` is the range of the frequency over its mean, `snr` the amplitude over the residual's standard deviation,
+    `scatter` the standard deviation of the amplitude of blocks over
     their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
     exceeds noise, otherwise 0; `missing` the fraction without numbers. `clipped` is the level at which the signal is
     cut off over its true amplitude, infinite if it is not cut off.
@@ -45,7 +33,6 @@ class LineFit:
     amplitude: float
     u: float
     u_noise: float
-    u_mains: float
     value: complex
     frequency_hz: float
     drift: float
@@ -105,9 +92,6 @@ class Chain:
     amplitude: Callable[[Floats, float, LineFit], float]
     unfit: Callable[[list[LineFit]], str] = lambda fits: ""
     gain: Callable[[float], float] | None = None
-    zeros_hz: float | None = None
-    """The frequency whose multiples the chain takes away."""
-    pass_hz: tuple[float, float] | None = None
     assumed: Mapping[str, Any] = field(default_factory=dict)
     """Parameters that the chain's source does not state, with the values that are assumed."""
 

@@ -66,8 +66,6 @@ def chain(table: ChainTable) -> Chain:
         lambda x, rate, fit: amplitude(table, x, rate),
         unfit=_unfit,
         gain=lambda hertz: gain(table, hertz),
-        zeros_hz=COMB_HZ,
-        pass_hz=(LOW_HZ, HIGH_HZ),
         assumed={name: getattr(table, name) for name in ASSUMED},
     )
 

@@ -3,7 +3,7 @@
 1. Coarse frequency by a spectrum. 2. Demodulate, cut the spin-up, smooth the phase. 3. Least squares on three
 harmonics, the lines of the mains that the record resolves, offset and slope, again without outliers. Mains and outliers
 are then removed and 2 and 3 repeated once. 4. The amplitude's uncertainty is that of the noise's density at the line
-over the record's length, of the scatter of blocks, and of mains that can't be separated.
+over the record's length, and of the scatter of blocks.
 """
 
 from __future__ import annotations
@@ -12,15 +12,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
-from scipy.ndimage import binary_dilation
 from scipy.signal import oaconvolve
 from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains import Chain, ChainTable, LineFit, Mains, Phase
+from unitcad.lab.chains import Chain, ChainTable, LineFit, Phase
 
 BAND_HZ = (60.0, 250.0)
-NO_MAINS = Mains()
 HARMONICS = 3
 FAR = 4.5
 """Robust standard deviations of the residual beyond which a sample is excluded; noise exceeds it now and then."""
@@ -41,28 +39,18 @@ def fit_line(
     x: Floats,
     rate: float,
     band: tuple[float, float] = BAND_HZ,
-    mains: Mains = NO_MAINS,
+    mains_hz: float = 50.0,
     full_scale: float | None = None,
     motor: LineFit | None = None,
 ) -> LineFit | None:
     """Return the line of samples x (n) at `rate` in Hz; None if the band has no line.
 
-    With `motor`, the fit of another channel of the record, the line has that channel's phase and its own amplitude. If
-    the line is there for less than about two thirds of the samples, the fit takes the longest stretch that has it.
+    With `motor`, the fit of another channel of the record, the line has that channel's phase and its own amplitude.
     """
     good = np.isfinite(x)
-    if good.sum() < LEAST_SAMPLES:
-        return None
-    if motor is None:
-        part = running_part(x - np.median(x[good]), good, rate, band, mains.frequency_hz)
-    elif motor.end_s - motor.start_s <= MOST_RUNNING * len(x) / rate:
-        part = slice(int(motor.start_s * rate), int(np.ceil(motor.end_s * rate)) + 1)
-    else:
-        part = None
-    part = part or slice(None)
-    x, good, time = x[part], good[part], (np.arange(len(x)) / rate)[part]
     if good.sum() < LEAST_SAMPLES or not np.ptp(x[good]) > 0:
         return None
+    time = np.arange(len(x)) / rate
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
     clipped = clip_level(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
@@ -79,9 +67,9 @@ def fit_line(
         edges = np.linspace(*span, max(round(length / 0.5), 2) + 1)
         frequencies = np.diff(phase(edges)) / np.diff(edges) / (2 * np.pi)
         frequency, spread = float(frequencies.mean()), float(np.ptp(frequencies))
-        orders = mains_orders(mains.frequency_hz, rate, (frequency,), length, spread)
+        orders = mains_orders(mains_hz, rate, (frequency,), length, spread)
         line = line_columns(phase(here), frequency, rate)
-        columns = np.concatenate([line, mains_columns(here, mains.frequency_hz, orders), trend_columns(here)])
+        columns = np.concatenate([line, mains_columns(here, mains_hz, orders), trend_columns(here)])
         use = known[inside]
         if use.sum() < LEAST_SAMPLES:
             return None
@@ -117,15 +105,12 @@ def fit_line(
         beside, size = line_beside(
             turned, rate, max(LEAST_LINE * amplitude, OVER_NOISE * deviation * np.sqrt(2 / use.sum()))
         )
-        order = round(frequency / mains.frequency_hz)
+        order = round(frequency / mains_hz)
         order = 0 if order in orders else order
-        # Mains that the record can't tell from the line have any phase: their part is that of a motor-off record.
-        share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if order else 0.0
         fit = LineFit(
             amplitude=abs(value),
-            u=float(np.sqrt(noise**2 + wander**2 + share**2)),
+            u=float(np.hypot(noise, wander)),
             u_noise=noise,
-            u_mains=float(share),
             value=value,
             frequency_hz=frequency,
             drift=spread / frequency,
@@ -137,7 +122,7 @@ def fit_line(
             dropped=masked if beyond_noise else 0.0,
             missing=float(np.mean(~good)),
             clipped=clipped,
-            mains_hz=order * mains.frequency_hz,
+            mains_hz=order * mains_hz,
             second_hz=frequency + beside if beside else 0.0,
             phase=phase,
         )
@@ -148,12 +133,12 @@ def fit_line(
         return found and found[0]
     # Demodulate and fit; then again without the mains and the drop-outs of the first fit.
     fit, clean, usable = None, x, known
-    frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
+    frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains_hz)
     for _ in range(2 if frequency > 0 else 0):
         at, line = envelope(clean, usable, time, rate, frequency)
         if len(at) < 4:
             return None
-        span = steady_span(at, line, (float(time[0]), float(time[0] + len(x) / rate)))
+        span = steady_span(at, line, (0.0, len(x) / rate))
         steady = (at >= span[0]) & (at <= span[1])
         phase = _best_phase(clean, time, rate, usable, span, phases(at[steady], line[steady], frequency))
         found = solved(phase, span) if phase else None
@@ -388,78 +373,6 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[tuple[Phase
             return omega * t + spline(inside) + (t - inside) * np.where(t != inside, spline(inside, 1), 0.0)
 
         yield straight_beyond, pieces + 3
-
-
-# The part of a record in which a motor runs, for records with more silence than half, whose medians are of the silence.
-
-MOST_RUNNING = 0.65
-"""Fraction of a record up to which only the running part is fitted: beyond, medians of all samples are of the line."""
-ON = 0.5
-"""Part of the envelope's largest value from which the motor runs."""
-SILENT = 0.2
-"""Part of it below which the envelope stays in the silence, once it has fallen; a beat falls slowly."""
-QUIET = 0.4
-"""The same for the rest of the silence without mains: a line that has only changed its frequency is louder."""
-LOWEST_HZ = 20.0
-FALL_S = 0.75 * WINDOW_S
-"""How long the envelope of a line that ends takes to fall, with a margin."""
-LEAST_SILENT = 0.2
-"""Part of a record that is silent at least."""
-LOUDEST, BEYOND_LOUDEST = 0.92, 1.5
-"""Quantile of the samples' size, and how many times it a sample counts at most: drop-outs are no motion."""
-
-
-def running_part(x: Floats, good: Bools, rate: float, band: tuple[float, float], mains_hz: float) -> slice | None:
-    """Return the longest stretch of samples in which the line of a record runs.
-
-    `x` has no offset; samples that are not `good` count for nothing. None if the line runs for most of the record,
-    or the rest is not silent.
-    """
-    most = BEYOND_LOUDEST * float(np.quantile(np.abs(x[good]), LOUDEST))
-    x = np.clip(np.where(good, x, 0.0), -most, most)
-    frequency = coarse_frequency(x, rate, band, mains_hz)
-    if not frequency > 0:
-        return None
-    time, line = envelope(x, good, np.arange(len(x)) / rate, rate, frequency)
-    if len(time) < 4:
-        return None
-    size = np.abs(line)
-    on = size >= ON * size.max()
-    if on.mean() > MOST_RUNNING:
-        return None
-    fall = max(int(FALL_S / float(np.median(np.diff(time)))), 1)
-    quiet = np.logical_not(binary_dilation(on, iterations=fall))
-    if quiet.mean() < LEAST_SILENT or size[quiet].max() > SILENT * size.max():
-        return None
-    first, last = _longest(quiet)
-    silence = x[int(time[first] * rate) : int(time[last] * rate) + 1]
-    if _loudest(silence, rate, band, mains_hz) > QUIET * size.max():
-        return None
-    first, last = _longest(on)
-    start = 0 if first == 0 else int(time[first] * rate)
-    return slice(start, None if last == len(on) - 1 else int(time[last] * rate) + 1)
-
-
-def _longest(on: Bools) -> tuple[int, int]:
-    """Return the first and the last index of the longest run of true values."""
-    runs = np.flatnonzero(np.diff(on.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    first, end = runs[np.argmax(runs[:, 1] - runs[:, 0])]
-    return int(first), int(end) - 1
-
-
-def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
-    """Return the amplitude of a line with all power of samples in a band, or of the strongest line outside, if more.
-
-    The mains and frequencies below LOWEST_HZ are excluded.
-    """
-    window = np.hanning(len(x) + 2)[1:-1]
-    turned = np.abs(np.fft.rfft((x - x.mean()) * window))
-    hertz = np.fft.rfftfreq(len(x), 1 / rate)
-    own = np.abs(hertz - mains_hz * np.round(hertz / mains_hz)) > 2 * rate / len(x)
-    inside = own & (hertz >= band[0]) & (hertz <= band[1])
-    whole = 2 * float(np.sqrt(np.sum(turned[inside] ** 2) / (len(x) * np.sum(window**2))))
-    strongest = 2 * float(turned[own & (hertz > LOWEST_HZ)].max(initial=0.0)) / window.sum()
-    return max(whole, strongest)
 
 
 # The standard uncertainty of a line's amplitude, from the residual of its fit.
