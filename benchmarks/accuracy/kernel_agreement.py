@@ -13,9 +13,9 @@ import numpy as np
 from benchmarks.accuracy import build123d_kernel, cadquery_kernel
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.measures import mesh_volume
-from benchmarks.accuracy.random_specs import seeded_spec
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.measurements import interleaved, timing
+from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.designs import shipped
 from unitcad.errors import Refusal
 from unitcad.kernels import bounds, mesh, occt
