@@ -118,8 +118,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     else:
         foot = f", elephant foot compensation {number(FOOT_MM, 3)} mm" if _has_foot(moulds) else ""
         low, high = (number(error, 2) for error in FDM_ERROR)
-        sliced = f"{low} to {high} times that by unitcad build {moulds.source} --slice -o sliced"
-        how.append(f"{takes} filament ({sliced}).")
+        how.append(f"{takes} filament (a slicer says {low} to {high} times that).")
         how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
     altered = []
     if lengths.shrinkage_percent:

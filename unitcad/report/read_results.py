@@ -76,7 +76,6 @@ class VariantRecord(Struct, kw_only=True):
     manifest: Manifest
     estimate: dict[str, Any] | None
     casting: dict[str, Any] | None
-    slicer: dict[str, Any] | None
     drawings: dict[str, str]
     pictures: dict[str, str]
     casts: list[dict[str, Any]]
@@ -171,7 +170,7 @@ def rows_of_csv(folder: Path) -> int | None:
 
 
 MANIFEST = "manifest.json"
-TABLES = ("estimate", "casting", "slicer")
+TABLES = ("estimate", "casting")
 """JSON files of a variant that the page shows, without their ending."""
 TIMINGS = "timings.json"
 """Left out of the page: the duration of a build differs from run to run."""
