@@ -1,5 +1,7 @@
 """Uniform blocks of vertices and triangles: the same model, line by line, as the parser alone gives."""
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -114,7 +116,7 @@ def _confirm_equal(text, block=10_000):
         patched.setattr(threemf_model, "_BLOCK", block)
         patched.setattr(threemf_model, "_SHORTEST", 1)
         at_once = _read(text)
-        patched.setattr(threemf_model, "cut_lists", lambda data: (data, {}))
+        patched.setattr(threemf_model, "cut_lists", lambda data: (data, []))
         assert at_once == _read(text)
 
 
@@ -146,15 +148,20 @@ def test_a_blank_that_xml_forbids_is_refused(blank):
         _confirm_equal(text)
 
 
+def test_a_part_full_of_comments_is_not_searched_again_and_again():
+    begin = time.process_time()
+    threemf_model.cut_lists(b"<!-- -->" * 200_000 + b"<!--" * 400_000)
+    assert time.process_time() - begin < 2
+
+
 @pytest.mark.parametrize("line_end", ["", "\n", "\r\n"])
 def test_most_of_a_part_is_read_at_once(line_end):
     vertices = "".join(f'  <vertex x="{i}.5" y="-{i}" z="1e-{i % 9}"/>{line_end}' for i in range(5000))
     triangles = "".join(f'<triangle v1="{i}" v2="{i + 1}" v3="{i + 2}" />{line_end}' for i in range(4998))
     text = _model(line_end + vertices, triangles)
-    rest, (vertices, rows) = threemf_model.cut_lists(text)[0], threemf_model.cut_lists(text)[1].values()
-    assert len(rest.strip()) < 400 + text.count(b"\n")
-    assert np.array_equal(vertices[:, 2], [float(f"1e-{i % 9}") for i in range(5000)])
-    assert np.array_equal(rows[:, 0], np.arange(4998))
+    assert len(threemf_model.cut_lists(text)[0].strip()) < 400 + text.count(b"\n")
     (mesh,) = (one.mesh for one in threemf_model.read_model(text, "a", Limits(), lambda: None).objects().values())
     assert mesh is not None
+    assert np.array_equal(mesh.vertices[:, 2], [float(f"1e-{i % 9}") for i in range(5000)])
+    assert np.array_equal(mesh.rows[:, 0], np.arange(4998))
     assert mesh.rows[-1, 7] == text[: text.rindex(b"<triangle")].count(b"\n") + 1

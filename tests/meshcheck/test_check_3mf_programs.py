@@ -116,18 +116,6 @@ def test_findings_name_part_object_and_line(judge):
     assert str(at["P011"]) == f"3D/3dmodel.model object '7' line {first}"
 
 
-@pytest.mark.parametrize("text", ["hello", "<![CDATA[<vertex x='1' y='2' z='3'/>]]>", "&#160;"])
-@pytest.mark.parametrize("behind", ["<vertices>", "<mesh>", '<object id="1">', "<build>"])
-def test_text_between_elements_is_a_finding(text, behind, judge):
-    model = model_xml(f'<object id="1">{mesh_xml()}</object>')
-    wrong = model.replace(behind, behind + text, 1)
-    assert wrong != model
-    for strict, severity in ((False, "warning"), (True, "error")):
-        report = judge(package(wrong), "a.3mf", strict_3mf=strict)
-        found = [found for found in report.findings if "text inside" in found.message]
-        assert [(one.code, one.severity) for one in found] == [("P017", severity)]
-
-
 @pytest.mark.parametrize("blank", ["\u00a0", "\u2003", "\u0085", "\u3000"])
 def test_blanks_that_xml_does_not_know_are_no_part_of_a_number(blank, judge):
     model = model_xml(f'<object id="1">{mesh_xml()}</object>')

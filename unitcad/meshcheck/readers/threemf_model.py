@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from array import array
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,14 +24,15 @@ from unitcad.meshcheck.rules.v_values import V001
 _NOT_FINITE = re.compile(NOT_FINITE, re.ASCII | re.IGNORECASE)
 
 
-def coordinate(text: str, model: Model, line: int) -> float:
-    """Return the number of an attribute's text; NaN for one that is not finite, 0 with a finding for no number."""
-    text = text.strip(" \t\r\n")
-    if schema.number(text):
-        return float(text)
-    if _NOT_FINITE.fullmatch(text):
-        return math.nan
-    model.add(F004, not_a_number(text).message, line=line)
+def coordinate(text: str, model: Model) -> float:
+    """Return the number of an attribute's text; 0, with a finding, if it is none or is not finite as float32."""
+    value = float(text) if schema.number(text) else math.nan
+    if abs(value) <= LARGEST:
+        return value
+    if schema.number(text) or _NOT_FINITE.fullmatch(text.strip(" \t\r\n")):
+        model.add(V001, "a vertex is not a finite float32 number")
+    else:
+        model.add(F004, not_a_number(text.strip(" \t\r\n")).message)
     return 0.0
 
 
@@ -58,11 +60,15 @@ def transform(text: str | None, model: Model) -> Floats:
 
 
 _BLOCK = 1 << 18  # bytes that stay in the processor's cache
-_OPEN = re.compile(rb"<(vertices|triangles)>")
+_NEXT = re.compile(rb"<!--|<(vertices|triangles)>")
 _XYZ = ("x", "y", "z")
 _COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
 _LISTS = {b"vertices": (b"vertex", _XYZ), b"triangles": (b"triangle", _COLUMNS)}
 """Elements of a list, and their attributes, of which each needs the first three."""
+_PLAIN = {
+    element: re.compile(rb'(?:\s*<%s(?:\s+[\w:.-]+="[^"<]*")*\s*/>)*\s*' % element) for element, _ in _LISTS.values()
+}
+"""Elements without content, one after the other."""
 _WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
 _AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
 _SHORTEST = 1500  # bytes; a shorter list costs the parser less
@@ -73,58 +79,57 @@ _DIGITS = table_of(b"0123456789")
 _IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
 
 
-def cut_lists(data: bytes) -> tuple[bytes, dict[int, Floats | Ints]]:
-    """Return a part without the elements of uniform lists, and the lists by the places of their tags in the rest.
+def cut_lists(data: bytes) -> tuple[bytes, list[tuple[int, Floats | Ints]]]:
+    """Return a part without uniform blocks of its lists, and these blocks with their places in the rest, in order.
 
-    All text between the numbers of a uniform list repeats. Vertices are (n, 3), triangles (m, 8), with lines counted
-    from the tag. Line ends stay, so that the parser counts them. In a comment, tags are none: then all stays.
+    All text between the numbers of a uniform block repeats. Vertices are (n, 3), triangles (m, 8). Line ends stay, so
+    that the parser counts them.
     """
-    lists: dict[int, Floats | Ints] = {}
-    if b"<!" in data or data.count(b"<?") > 1:
-        return data, lists
-    pieces, size, at = list[bytes](), 0, 0
-    while (opened := _OPEN.search(data, at)) and (end := data.find(b"</", opened.end())) >= 0:
-        begin = opened.end()
-        found = _read_list(data, begin, end, opened[1]) if end - begin >= _SHORTEST else None
-        place = size + opened.start() - at
-        pieces += [data[at:begin], data[begin:end] if found is None else b"\n" * data.count(b"\n", begin, end)]
-        if found is not None:
-            lists[place] = found
-        size, at = size + len(pieces[-2]) + len(pieces[-1]), end
-    return b"".join([*pieces, data[at:]]), lists
+    cut: list[tuple[int, Floats | Ints]] = []
+    if b"<![" in data or data.count(b"<?") > 1 or data.count(b"\r") != data.count(b"\r\n"):
+        return data, cut
+    pieces, size, at, line, place = list[bytes](), 0, 0, 1, 0
+    while found := _NEXT.search(data, place):
+        end = data.find(b"-->" if found[1] is None else b"</", found.end())
+        if end < 0:
+            break
+        place = end if found[1] is None else found.end()
+        if end - place < _SHORTEST:
+            continue
+        for begin, stop, block in _blocks_of(data, place, end, *_LISTS[found[1]]):
+            line += data.count(b"\n", at, begin)
+            if block.shape[1] > LINE:
+                block[:, LINE] += line
+            ends = data.count(b"\n", begin, stop)
+            pieces += [data[at:begin], b"\n" * ends]
+            size += begin - at
+            cut.append((size, block))
+            size, line, at = size + ends, line + ends, stop
+    return b"".join([*pieces, data[at:]]), cut
 
 
-def _read_list(data: bytes, at: int, end: int, name: bytes) -> Floats | Ints | None:
-    """Return the vertices or triangles of a list, None if it is not uniform or an element needs a finding."""
-    element, known = _LISTS[name]
-    kept, lines, last = [], 0, data.rfind(b"/>", at, end) + 2
-    if data[last:end].strip():
-        return None
+def _blocks_of(
+    data: bytes, at: int, end: int, element: bytes, known: tuple[str, ...]
+) -> list[tuple[int, int, Floats | Ints]]:
+    """Return the uniform blocks of a list with their ends; none if there is more in it than elements without content.
+
+    Blocks in which an element needs a finding are left to the parser.
+    """
+    blocks, last = [], data.rfind(b"/>", at, end) + 2
     while at < last:
-        block = data[at : data.rfind(b"/>", at, min(at + _BLOCK, last)) + 2]
-        if (columns := _read_block(block, element, known)) is None:
-            return None
-        if name == b"vertices":
-            values = np.stack([columns[axis] for axis in _XYZ], axis=1)
-            if not (np.abs(values) <= LARGEST).all():
-                return None
-        else:
-            values = np.full((len(columns["line"]), LINE + 1), -1)
-            for i, column in enumerate(_COLUMNS):
-                values[:, i] = columns.get(column, -1)
-            values[:, LINE] = columns["line"] + lines
-            if not values[:, LINE - 1].all():  # no resource has the id 0
-                return None
-        kept.append(values)
-        lines += block.count(b"\n")
-        at += len(block)
-    return np.concatenate(kept)
+        stop = data.rfind(b"/>", at, min(at + _BLOCK, last)) + 2
+        text = data[at:stop]
+        values = _read_block(text, element, known)
+        if values is not None:
+            blocks.append((at, stop, values))
+        elif not text or _PLAIN[element].fullmatch(text) is None:
+            return []
+        at = stop
+    return [] if data[at:end].strip() else blocks
 
 
-def _read_block(block: bytes, element: bytes, known: tuple[str, ...]) -> dict[str, Floats | Ints] | None:
-    """Return the attributes of elements as columns, and the line of each, 0 for the first; None if not uniform."""
-    if b"\r" in block and block.count(b"\r") != block.count(b"\r\n"):
-        return None
+def _read_block(block: bytes, element: bytes, known: tuple[str, ...]) -> Floats | Ints | None:
+    """Return the vertices or triangles of a block, with lines counted from its first; None if it is not uniform."""
     head = re.match(rb"[ \t\r\n]*<" + element + rb'[ \t\r\n]+(\w+)="', block)
     if head is None:
         return None
@@ -145,10 +150,15 @@ def _read_block(block: bytes, element: bytes, known: tuple[str, ...]) -> dict[st
     numbers = _numbers(text, quotes[:, ::2] + 1, quotes[:, 1::2], whole=known is _COLUMNS)
     if numbers is None:
         return None
+    if known is _XYZ:
+        values = numbers[:, [names.index(axis) for axis in known]]
+        return values if (np.abs(values) <= LARGEST).all() else None
+    values = np.full((len(numbers), LINE + 1), -1)
+    values[:, [known.index(name) for name in names]] = numbers
     first = block.index(b"<")
     starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
-    lines = np.searchsorted(np.flatnonzero(text == NEWLINE), starts)
-    return {"line": lines, **{name: numbers[:, i] for i, name in enumerate(names)}}
+    values[:, LINE] = np.searchsorted(np.flatnonzero(text == NEWLINE), starts)
+    return values if values[:, LINE - 1].all() else None  # no resource has the id 0
 
 
 def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
@@ -187,7 +197,6 @@ def _numbers(text: Ints, begin: Ints, end: Ints, *, whole: bool) -> Floats | Int
     return None if values is None else values.reshape(begin.shape)
 
 
-_BATCH = 50_000
 _DEPTH = 60
 
 
@@ -200,7 +209,6 @@ class _Open:
     rules: schema.ElementSchema | None
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
-    told: bool = False
 
 
 # Text that programs write for a missing name. Other unprefixed names pass: consumers ignore them (core, 3.4.1).
@@ -210,23 +218,18 @@ _PLACEHOLDERS = {"undefined", "null"}
 class _Reader:
     """Handlers for expat; its state is the stack of open elements and the object or resource being read."""
 
-    def __init__(self, model: Model, limits: Limits, spent_faces: int, lists: dict[int, Floats | Ints]) -> None:
-        self.model, self.limits, self.faces, self.lists = model, limits, spent_faces, lists
+    def __init__(self, model: Model, limits: Limits, spent_faces: int, cut: list[tuple[int, Floats | Ints]]) -> None:
+        self.model, self.limits, self.faces, self.cut = model, limits, spent_faces, cut[::-1]
         self.parser = new_parser(self.start, self.end)
         self.parser.StartNamespaceDeclHandler = self.namespace
-        self.parser.CharacterDataHandler = self.text_inside
         model.where = self._where
         self.stack: list[_Open] = [_Open("", "", None)]
         self.skip = 0
         self.rank = self.uses = 0
         self.resource: Resource | None = None
         self.names: set[str] = set()
-        self.numbers: list[str] = []
-        self.lines: list[int] = []
+        self.numbers, self.indices = array("d"), array("q")
         self.vertices: list[Floats] = []
-        self.n_vertices = 0
-        self.beyond = False
-        self.triangles: list[tuple[int, ...]] = []
         self.rows: list[Ints] = []
 
     def _where(self) -> Location:
@@ -241,14 +244,6 @@ class _Reader:
             self.skip += 1
             if self.skip > _DEPTH:
                 raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
-            return
-        above = self.stack[-1]
-        if name == _VERTEX and flat[::2] == _PLAIN and above.name == "vertices" and above.space == schema.CORE:
-            self.numbers += flat[1::2]
-            self.lines.append(self.parser.CurrentLineNumber)
-            self.stack.append(_LEAF)
-            if len(self.numbers) >= 3 * _BATCH:
-                self._flush_vertices()
             return
         if len(self.stack) > _DEPTH:
             raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
@@ -273,27 +268,20 @@ class _Reader:
         if good:
             self._take(space, local, attributes)
 
-    def text_inside(self, text: str) -> None:
-        """Find fault with text in an element that holds none."""
-        above = self.stack[-2] if self.stack[-1] is _LEAF else self.stack[-1]
-        if not self.skip and not above.told and above.name not in ("", "metadata") and text.strip(" \t\r\n"):
-            above.told = True
-            self.model.add_lenient(P017, f"text inside <{above.name}>")
-
     def end(self, _: str) -> None:
         if self.skip:
             self.skip -= 1
+            while self.cut and self.cut[-1][0] <= self.parser.CurrentByteIndex:
+                self.cut.pop()
             return
         done = self.stack.pop()
-        if done is _LEAF or done.rules is None:
+        if done.rules is None:
             return
         for child, least, _most in done.rules.children:
             if done.counts.get(child, 0) < least:
                 self.model.add(P017, f"<{done.name}> lacks <{child}>")
-        if done.space == schema.CORE and done.name == "vertices":
-            self._flush_vertices()
-        elif done.space == schema.CORE and done.name == "triangles":
-            self._flush_triangles()
+        if done.space == schema.CORE and done.name in ("vertices", "triangles"):
+            self._take_blocks()
         elif done.space == schema.CORE and done.name == "mesh":
             self._close_mesh()
         elif done.name == "object" and isinstance(self.resource, Object):
@@ -304,9 +292,6 @@ class _Reader:
     def _child(self, space: str, local: str, rules: schema.ElementSchema | None) -> None:
         """Check that this child may stand here, and in this order."""
         parent = self.stack[-1]
-        if parent is _LEAF:
-            self.model.add(P017, f"<{local}> inside <vertex>")
-            return
         if not parent.name:
             if (space, local) != (schema.CORE, "model"):
                 raise P017.unreadable(f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
@@ -409,27 +394,22 @@ class _Reader:
         kind = attributes.get("type", "model")
         self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
-    def _take_vertices(self, _: dict[str, str]) -> None:
-        vertices = self.lists.get(self.parser.CurrentByteIndex)
-        if vertices is not None:
-            self._flush_vertices()
-            self._keep_vertices(vertices)
-
-    def _take_triangles(self, _: dict[str, str]) -> None:
-        rows = self.lists.get(self.parser.CurrentByteIndex)
-        if rows is not None:
-            self._flush_triangles()
-            rows[:, LINE] += self.parser.CurrentLineNumber
-            self.rows.append(rows)
-            self.rank += len(rows)
-            self._count_faces(len(rows))
+    def _take_blocks(self) -> None:
+        """Keep the blocks that were cut out in front of what the parser reports."""
+        while self.cut and self.cut[-1][0] <= self.parser.CurrentByteIndex:
+            self._flush()
+            _, block = self.cut.pop()
+            if block.shape[1] > LINE:
+                self.rows.append(block)
+                self._count_faces(len(block))
+            else:
+                self.vertices.append(block)
 
     def _take_triangle(self, attributes: dict[str, str]) -> None:
-        row = tuple(int(attributes.get(name, -1)) for name in _COLUMNS)
-        self.triangles.append((*row, self.parser.CurrentLineNumber))
+        self._take_blocks()
+        self.indices.extend(int(attributes.get(name, -1)) for name in _COLUMNS)
+        self.indices.append(self.parser.CurrentLineNumber)
         self._count_faces(1)
-        if len(self.triangles) >= _BATCH:
-            self._flush_triangles()
 
     def _count_faces(self, number: int) -> None:
         self.faces += number
@@ -437,8 +417,8 @@ class _Reader:
             raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
 
     def _take_vertex(self, attributes: dict[str, str]) -> None:
-        self.numbers += [attributes["x"], attributes["y"], attributes["z"]]
-        self.lines.append(self.parser.CurrentLineNumber)
+        self._take_blocks()
+        self.numbers.extend(coordinate(attributes[axis], self.model) for axis in _XYZ)
 
     def _take_component(self, attributes: dict[str, str]) -> None:
         if isinstance(self.resource, Object):
@@ -458,41 +438,17 @@ class _Reader:
         matrix = transform(attributes.get("transform"), self.model)
         return Use(int(attributes["objectid"]), path, matrix, self.rank, self.parser.CurrentLineNumber)
 
-    def _flush_vertices(self) -> None:
-        if not self.numbers:
-            return
-        try:
-            text = "".join(self.numbers)
-            if not text.isascii() or "_" in text:  # which Python takes for a number's
-                raise ValueError(text[:40])
-            values = np.array(self.numbers, dtype=np.float64)
-        except ValueError:
-            values = np.array([coordinate(text, self.model, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
-        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
-        if len(bad):
-            if not self.beyond:
-                self.model.add(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
-            self.beyond = True
-            values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        self.numbers, self.lines = [], []
-        self._keep_vertices(values.reshape(-1, 3))
-
-    def _keep_vertices(self, values: Floats) -> None:
-        self.vertices.append(values)
-        self.n_vertices += len(values)
-        if self.n_vertices > 3 * self.limits.max_faces + 3:
-            raise F011.unreadable("more vertices than three times --max-faces")
-
-    def _flush_triangles(self) -> None:
-        if self.triangles:
-            self.rows.append(np.array(self.triangles, dtype=np.int64))
-            self.triangles = []
+    def _flush(self) -> None:
+        """Keep the vertices and triangles that the parser reported."""
+        self.vertices.append(np.array(self.numbers).reshape(-1, 3))
+        self.rows.append(np.array(self.indices).reshape(-1, LINE + 1))
+        self.numbers, self.indices = array("d"), array("q")
 
     def _close_mesh(self) -> None:
+        self._flush()
         if isinstance(self.resource, Object):
-            vertices = np.concatenate([np.empty((0, 3)), *self.vertices])
-            self.resource.mesh = Triangles(vertices, np.concatenate([np.empty((0, LINE + 1), np.int64), *self.rows]))
-        self.vertices, self.n_vertices, self.rows, self.beyond = [], 0, [], False
+            self.resource.mesh = Triangles(np.concatenate(self.vertices), np.concatenate(self.rows))
+        self.vertices, self.rows = [], []
 
     def _close_object(self, resource: Object) -> None:
         if resource.mesh is None and not resource.components and not resource.other_shape:
@@ -503,9 +459,6 @@ class _Reader:
 
 # Extensions whose elements take the place of an object's mesh, or stand on its vertices.
 _SHAPES = {schema.BEAM, schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT}
-_PLAIN = list(_XYZ)
-_LEAF = _Open(schema.CORE, "vertex", None)
-_VERTEX = f"{schema.CORE} vertex"
 
 
 def read_model(
@@ -513,9 +466,9 @@ def read_model(
 ) -> Model:
     """Read one model part. Schema faults are the model's findings; raises `Unreadable` if XML or a limit ends it."""
     model = Model(part, strict=strict)
-    text, lists = cut_lists(data)
+    text, cut = cut_lists(data)
     try:
-        parse(_Reader(model, limits, spent_faces, lists).parser, text, part, tick)
+        parse(_Reader(model, limits, spent_faces, cut).parser, text, part, tick)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

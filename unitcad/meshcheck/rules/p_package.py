@@ -130,8 +130,8 @@ P016 = Rule("""
 P017 = Rule("""
     P017 error: against the schema
     An element or attribute is missing, unknown, repeated, out of order, of the wrong type, or forbidden (xml:space, xsi
-    attributes), or text stands between elements. Such text, an unknown attribute without a prefix and metadata of one
-    name are warnings, unless --3mf-strict is given, since common programs write such files.
+    attributes). An unknown attribute without a prefix and metadata of one name are warnings, unless --3mf-strict is
+    given, since common programs write such files.
     Example: A `<triangle>` has v1 and v2, and no v3.
     Fix: Write the element by its 3MF schema.
 """)
