@@ -136,7 +136,7 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
     if table.measured is not None:
         field = f"{where}.measured"
         path = file_of(folder, table.measured, field)
-        level, measured_hz, chain = _measured(field, table, path, inputs.get(source or ""))
+        level, measured_hz, chain = _measured(field, table, path)
         inputs[table.measured] = files.sha256(path)
         hertz, said = hertz or measured_hz, f"{table.measured}, chain {chain}"
     assert level is not None
@@ -149,12 +149,8 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
     return OwnUnit(table.name, asked, built, hertz, level, f"{said}, {walls}" if walls else said)
 
 
-def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | None) -> tuple[LevelTable, float, str]:
-    """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by the file's first chain.
-
-    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. If a campaign
-    names a spec and the fit a cast record, nothing is compared.
-    """
+def _measured(where: str, table: FitUnitTable, path: Path) -> tuple[LevelTable, float, str]:
+    """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by its first chain."""
     data = read_toml(path)
     chain, rows = data.get("chain"), data.get("level")
     if data.get("status") != "measured" or not isinstance(rows, list):
@@ -167,16 +163,6 @@ def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | 
     hertz = row.get("frequency_hz")
     if not isinstance(hertz, int | float):
         raise Refusal(f"{where}.frequency_hz", hertz, "must be a number")
-    key = "cast" if table.cast is not None else "spec"
-    there, here = row.get(key), getattr(table, key)
-    if there is not None:
-        sha256 = next((one.get("sha256") for one in data.get("source", ()) if one.get("file") == there), None)
-        if sha256 and source_sha256 and sha256 != source_sha256:
-            raise Refusal(where, table.measured, f"was measured with another {here}: its SHA-256 differs")
-        if not sha256 and not source_sha256 and there != here:
-            raise Refusal(where, table.measured, f"was measured of the template {there}, not {here}")
-        if row.get("cavity", table.cavity) != table.cavity:
-            raise Refusal(where, table.measured, f"was measured of cavity {row['cavity']}, not {table.cavity}")
     return level, float(hertz), str(chain)
 
 
