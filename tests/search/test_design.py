@@ -21,7 +21,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.search import design_files, proposals
 from unitcad.search.candidates import candidates, sequences_of, spec_data
 from unitcad.search.design_files import front
-from unitcad.search.proposals import EQUAL, explain, invert, kinds, name_of
+from unitcad.search.proposals import EQUAL, invert, kinds, name_of
 from unitcad.search.target_file import load_target, target_of
 from unitcad.validation import from_data, load
 
@@ -221,8 +221,6 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch):
     made = invert(_target())
     assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])
     assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]
-    out = explain(made, made.data["not_castable"][0]["name"])
-    assert "can't be cast: C300 layer1: 0.1 against 0.2 mm" in out["reasons"]
 
 
 @pytest.mark.parametrize("check", [True, False])
@@ -249,29 +247,6 @@ def test_the_measured_unit_of_the_kind_stands_beside():
     best = invert(_target(vary), check=False).data["proposals"][0]
     assert best["measured"] is None
     assert best["measured_sibling"]["level"] == 0.04
-
-
-def test_reasons_of_what_is_not_among_the_proposals(known):
-    assert explain(known, "encapsulating-e10-d30-1.25-1.25")["reasons"] == []
-    same = explain(known, "encapsulating")
-    assert (same["listed"], same["reasons"]) == (2, [])
-    three = explain(known, "three-layer")["reasons"]
-    assert any("vary.layers has no 3" in line for line in three)
-    varied = invert(_target({"layers": [2], "wall_mm": [1.25, 1.75], "step_mm": 0.25}), check=False)
-    other = explain(varied, "encapsulating-e10-d30-1.5-1.5")["reasons"]
-    assert "best of its kind" in other[0]
-    last = explain(known, "embedded-d10-e10-1.25-1.25")["reasons"]
-    assert "kinds come before it" in last[0]
-    assert any("not at hand" in line for line in explain(known, "motor-10mm")["reasons"])
-    with pytest.raises(Refusal, match="--explain = 'nothing'"):
-        explain(known, "nothing")
-
-
-def test_a_material_without_a_modulus_is_explained(known, tmp_path):
-    spec = tmp_path / "soft.toml"
-    text = (Path(load_target.__code__.co_filename).parents[2] / "templates/embedded.toml").read_text("utf-8")
-    spec.write_text(text.replace("ecoflex-00-10", "ecoflex-00-50"), "utf-8")
-    assert any("no small-strain modulus" in line for line in explain(known, str(spec))["reasons"])
 
 
 def test_the_front_is_what_nothing_beats(found):
@@ -315,7 +290,7 @@ def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(kno
     assert (folder / "notes.txt").read_text("utf-8") == "mine"
 
 
-def test_the_command_writes_its_folder_and_explains(tmp_path):
+def test_the_command_writes_its_folder(tmp_path):
     done = unitcad("design", "published", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-published"
@@ -324,9 +299,6 @@ def test_the_command_writes_its_folder_and_explains(tmp_path):
     assert made == {"design.html", "design.md", "design.json", "ranking.csv", "specs"}
     as_json = json.loads(unitcad("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)
     assert as_json["folder"] == "out/design-published"
-    why = unitcad("design", "published", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
-    assert "vary.layers has no 3" in why.stdout
-    assert not (tmp_path / "other").exists()
     assert unitcad("build", as_json["proposals"][0]["file"], "--only", "estimate", cwd=tmp_path).returncode == 0
     (tmp_path / "quiet.toml").write_text("[target]\nedge_max = 0.01\n", "utf-8")
     refused = unitcad("design", "quiet.toml", "-o", "none", cwd=tmp_path)

@@ -130,19 +130,6 @@ def lines(one: Mapping[str, Any]) -> list[str]:
     return [*made, one["lengths_gain"], *one["remarks"]]
 
 
-def explanation_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return an answer of `explain`."""
-    head = data["name"]
-    if data["probability"] is not None:
-        place = f", place {data['rank']} of {data['of']}" + ("" if data["among"] else " if it were tried")
-        head += f": {level_line(data)}{place if data['rank'] else ''}"
-    elif data["measured"]:
-        head += f": {measured_words(data['measured'])}"
-    is_proposal = data["listed"] and not data["nearest_other"]
-    among = [f"it is among the proposals, as number {data['listed']}"] if is_proposal else []
-    return [head, *(f"  {line}" for line in [*among, *data["reasons"]])]
-
-
 SPECS = "specs"
 _QUANTITIES = {
     "mass_g": "mass, g",
