@@ -3,7 +3,6 @@
 import csv
 import itertools
 import json
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,6 @@ from unitcad.kernels.mesh import bounds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search import design_files, proposals
 from unitcad.search.candidates import candidates, sequences_of, spec_data
-from unitcad.search.design_files import front
 from unitcad.search.proposals import EQUAL, invert, kinds, name_of
 from unitcad.search.target_file import load_target, target_of
 from unitcad.validation import from_data, load
@@ -249,17 +247,6 @@ def test_the_measured_unit_of_the_kind_stands_beside():
     assert best["measured_sibling"]["level"] == 0.04
 
 
-def test_the_front_is_what_nothing_beats(found):
-    rows = np.arange(found.count)
-    best = front(found, rows, found.mass_g)
-    p, mass = found.probability, found.mass_g
-    for row in best:
-        assert not np.any((p > p[row] + 1e-9) & (mass <= mass[row]))
-    for row in np.random.default_rng(1).integers(0, found.count, 40):
-        beaten = [one for one in best if p[one] >= p[row] - 1e-9 and mass[one] <= mass[row] + 1e-12]
-        assert beaten
-
-
 def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known, tmp_path):
     first = design_files.contents(known, "out/design-published")
     again = design_files.contents(invert(load_target("published"), check=True), "out/design-published")
@@ -270,9 +257,6 @@ def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(know
     assert [int(row["place"]) for row in rows] == list(range(1, len(rows) + 1))
     p = [round(float(row["probability"]), 2) for row in rows]
     assert p == sorted(p, reverse=True)
-    for name in first:
-        if name.startswith("front-"):
-            ElementTree.fromstring(first[name])
     data = json.loads(first["design.json"])
     for one, spec in zip(data["proposals"], known.specs, strict=True):
         file = tmp_path / "design-published/specs" / Path(one["file"]).name
@@ -295,8 +279,8 @@ def test_the_command_writes_its_folder(tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-published"
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.8" in done.stdout
-    made = {path.name for path in (tmp_path / "out/design-published").iterdir() if not path.name.startswith("front-")}
-    assert made == {"design.html", "design.md", "design.json", "ranking.csv", "specs"}
+    made = {path.name for path in (tmp_path / "out/design-published").iterdir()}
+    assert made == {"design.html", "design.json", "ranking.csv", "specs"}
     as_json = json.loads(unitcad("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)
     assert as_json["folder"] == "out/design-published"
     assert unitcad("build", as_json["proposals"][0]["file"], "--only", "estimate", cwd=tmp_path).returncode == 0

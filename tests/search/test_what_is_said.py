@@ -56,8 +56,7 @@ def test_what_the_evidence_ranks_and_what_not_is_said(quiet):
     assert said[2] == f"not ranked by {unranked}, except by an assumed line below a ratio of 16.7"
     second = lines(quiet.data["proposals"][1])
     assert second[0] == "as likely as number 1; among equals the unit that is easier to make comes first"
-    page = contents(quiet, "x")
-    assert all(said[2] in page[name].decode() for name in ("design.md", "design.html"))
+    assert said[2] in contents(quiet, "x")["design.html"].decode()
 
 
 def test_the_ranking_has_the_proposals_numbers_and_the_measurements(quiet):
@@ -86,7 +85,6 @@ def test_a_mass_is_shown_as_exactly_as_its_limit():
 def test_the_command_that_builds_is_quoted(paper):
     found = contents(paper, "odd dir/design-published")
     file = f"odd dir/design-published/specs/1-{paper.data['proposals'][0]['name']}.toml"
-    assert f"`unitcad build '{file}'`" in found["design.md"].decode()
     assert f"unitcad build '{file}'" in html.unescape(found["design.html"].decode())
 
 
