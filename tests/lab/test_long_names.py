@@ -12,7 +12,7 @@ def table(name):
 CAMPAIGN = """
 name = "x"
 sensor = { quantity = "displacement", unit = "um" }
-unit = [{ name = "u", spec = "encapsulating", reference = ["a.csv"], edge = ["b.csv"] }]
+unit = [{ name = "u", reference = ["a.csv"], edge = ["b.csv"] }]
 """
 FILES = {
     "a.csv": table("channel {} (V)"),

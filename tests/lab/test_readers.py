@@ -310,17 +310,6 @@ def test_columns_of_other_languages_are_known(encoding, names, tmp_path):
     np.testing.assert_allclose(data["force"], EDGE, atol=1e-6)
 
 
-def test_lost_samples_leave_their_places_empty(tmp_path):
-    kept = np.delete(np.arange(COUNT), [5, 6, 100, 250])
-    read(tmp_path / "a.csv", ["Time (s),motor (V)", *rows(TIME[kept], MOTOR[kept])])
-    sensor = SensorTable(quantity="velocity", unit="mm/s", scale=2.0)
-    signal = open_signal(tmp_path / "a.csv", RecordingTable(), (sensor,), "a.csv")
-    assert (signal.count, signal.missing, signal.off_grid) == (COUNT, (4,), 0.0)
-    assert signal.rate == pytest.approx(RATE, rel=1e-9)
-    expected = np.where(np.isin(np.arange(COUNT), kept), 2 * MOTOR, np.nan)
-    np.testing.assert_allclose(signal.samples[:, 0], expected, atol=1e-5)
-
-
 def test_a_universal_file_that_is_cut_off_is_refused_with_its_whole_first_channels(tmp_path):
     """pyuff reads the data sets before the cut and says nothing."""
     name = next(name for name in FORMATS if name.endswith(".uff"))

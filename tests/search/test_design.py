@@ -3,7 +3,6 @@
 import csv
 import itertools
 import json
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +19,7 @@ from unitcad.kernels.mesh import bounds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search import design_files, proposals
 from unitcad.search.candidates import candidates, sequences_of, spec_data
-from unitcad.search.design_files import front
-from unitcad.search.proposals import EQUAL, explain, invert, kinds, name_of
+from unitcad.search.proposals import EQUAL, invert, kinds, name_of
 from unitcad.search.target_file import load_target, target_of
 from unitcad.validation import from_data, load
 
@@ -221,8 +219,6 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch):
     made = invert(_target())
     assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])
     assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]
-    out = explain(made, made.data["not_castable"][0]["name"])
-    assert "can't be cast: C300 layer1: 0.1 against 0.2 mm" in out["reasons"]
 
 
 @pytest.mark.parametrize("check", [True, False])
@@ -251,40 +247,6 @@ def test_the_measured_unit_of_the_kind_stands_beside():
     assert best["measured_sibling"]["level"] == 0.04
 
 
-def test_reasons_of_what_is_not_among_the_proposals(known):
-    assert explain(known, "encapsulating-e10-d30-1.25-1.25")["reasons"] == []
-    same = explain(known, "encapsulating")
-    assert (same["listed"], same["reasons"]) == (2, [])
-    three = explain(known, "three-layer")["reasons"]
-    assert any("vary.layers has no 3" in line for line in three)
-    varied = invert(_target({"layers": [2], "wall_mm": [1.25, 1.75], "step_mm": 0.25}), check=False)
-    other = explain(varied, "encapsulating-e10-d30-1.5-1.5")["reasons"]
-    assert "best of its kind" in other[0]
-    last = explain(known, "embedded-d10-e10-1.25-1.25")["reasons"]
-    assert "kinds come before it" in last[0]
-    assert any("not at hand" in line for line in explain(known, "motor-10mm")["reasons"])
-    with pytest.raises(Refusal, match="--explain = 'nothing'"):
-        explain(known, "nothing")
-
-
-def test_a_material_without_a_modulus_is_explained(known, tmp_path):
-    spec = tmp_path / "soft.toml"
-    text = (Path(load_target.__code__.co_filename).parents[2] / "templates/embedded.toml").read_text("utf-8")
-    spec.write_text(text.replace("ecoflex-00-10", "ecoflex-00-50"), "utf-8")
-    assert any("no small-strain modulus" in line for line in explain(known, str(spec))["reasons"])
-
-
-def test_the_front_is_what_nothing_beats(found):
-    rows = np.arange(found.count)
-    best = front(found, rows, found.mass_g)
-    p, mass = found.probability, found.mass_g
-    for row in best:
-        assert not np.any((p > p[row] + 1e-9) & (mass <= mass[row]))
-    for row in np.random.default_rng(1).integers(0, found.count, 40):
-        beaten = [one for one in best if p[one] >= p[row] - 1e-9 and mass[one] <= mass[row] + 1e-12]
-        assert beaten
-
-
 def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known, tmp_path):
     first = design_files.contents(known, "out/design-published")
     again = design_files.contents(invert(load_target("published"), check=True), "out/design-published")
@@ -295,9 +257,6 @@ def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(know
     assert [int(row["place"]) for row in rows] == list(range(1, len(rows) + 1))
     p = [round(float(row["probability"]), 2) for row in rows]
     assert p == sorted(p, reverse=True)
-    for name in first:
-        if name.startswith("front-"):
-            ElementTree.fromstring(first[name])
     data = json.loads(first["design.json"])
     for one, spec in zip(data["proposals"], known.specs, strict=True):
         file = tmp_path / "design-published/specs" / Path(one["file"]).name
@@ -315,18 +274,15 @@ def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(kno
     assert (folder / "notes.txt").read_text("utf-8") == "mine"
 
 
-def test_the_command_writes_its_folder_and_explains(tmp_path):
+def test_the_command_writes_its_folder(tmp_path):
     done = unitcad("design", "published", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-published"
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.8" in done.stdout
-    made = {path.name for path in (tmp_path / "out/design-published").iterdir() if not path.name.startswith("front-")}
-    assert made == {"design.html", "design.md", "design.json", "ranking.csv", "specs"}
+    made = {path.name for path in (tmp_path / "out/design-published").iterdir()}
+    assert made == {"design.html", "design.json", "ranking.csv", "specs"}
     as_json = json.loads(unitcad("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)
     assert as_json["folder"] == "out/design-published"
-    why = unitcad("design", "published", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
-    assert "vary.layers has no 3" in why.stdout
-    assert not (tmp_path / "other").exists()
     assert unitcad("build", as_json["proposals"][0]["file"], "--only", "estimate", cwd=tmp_path).returncode == 0
     (tmp_path / "quiet.toml").write_text("[target]\nedge_max = 0.01\n", "utf-8")
     refused = unitcad("design", "quiet.toml", "-o", "none", cwd=tmp_path)

@@ -13,7 +13,7 @@ from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.lab.chains import ChainTable, chains_of
 from unitcad.lab.readers import Quantity, expect_ending, to_si
-from unitcad.lab.unit_files import File, Name, UnitSource, file_of, source_file
+from unitcad.lab.unit_files import File, Name, file_of
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
 from unitcad.validation.load import load_file
@@ -65,9 +65,10 @@ class PointTable(Table, frozen=True, kw_only=True):
     records: Annotated[Records, Meta(description="records at this point")]
 
 
-class UnitTable(UnitSource, frozen=True, kw_only=True):
-    """One unit: its spec or the record of its casting, and its records."""
+class UnitTable(Table, frozen=True, kw_only=True):
+    """One unit: its name and its records."""
 
+    name: Annotated[Name, Meta(description="a name of the unit; a fit's file has the same")]
     reference: Annotated[Records, Meta(description="records of the motor alone, without motor_channel")] = ()
     edge: Annotated[Records, Meta(description="records at the unit's edge")] = ()
     point: tuple[PointTable, ...] = ()
@@ -119,7 +120,7 @@ def _campaign_of(data: dict[str, Any]) -> Campaign:
 def check_files(campaign: Campaign, folder: Path) -> None:
     """Check every name of a campaign with files in or below `folder`, without reading a record.
 
-    Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
+    Raises Refusal for a file that is not there or has no reader, a record given twice in
     one unit by its path or its bytes.
     """
     by_unit = []
@@ -127,8 +128,6 @@ def check_files(campaign: Campaign, folder: Path) -> None:
         places = {"reference": unit.reference, "edge": unit.edge}
         places |= {f"point.{k}.records": point.records for k, point in enumerate(unit.point)}
         by_unit.append([(f"unit.{i}.{at}.{k}", name) for at, names in places.items() for k, name in enumerate(names)])
-    for i, unit in enumerate(campaign.unit):
-        source_file(unit, folder, f"unit.{i}")
     for field, name in chain.from_iterable(by_unit):
         expect_ending(file_of(folder, name, field), field)
     for records in by_unit:

@@ -1,4 +1,4 @@
-"""unitcad fit: lab-fit.toml, fit.json, fit.md and fit.svg. The same input, the same bytes."""
+"""unitcad fit: lab-fit.toml, fit.json and fit.svg. The same input, the same bytes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ def contents(result: Fitted) -> dict[str, str]:
         FIT: fit_toml(result),
         "fit.json": json.dumps(as_data(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
         "fit.svg": _chart(result),
-        "fit.md": page(result),
     }
 
 
@@ -48,20 +47,10 @@ def fit_toml(result: Fitted) -> str:
 def as_data(result: Fitted) -> dict[str, Any]:
     """Return everything as JSON-ready data."""
     settings = result.lab.settings
-    scores = {
-        source: {"reason": compared.reason}
-        if compared.reason
-        else {
-            name: {"leave_one_out": one.score, "range": one.range, "coverage": one.coverage}
-            for name, one in compared.judged.items()
-        }
-        for source, compared in result.by_source.items()
-    }
     return {
         "name": settings.name,
         "note": settings.note,
         "moduli": settings.moduli,
-        "by_moduli": rounded(scores, 6),
         "units": unit_rows(result),
         "models_differ_on": differing_units(result),
         "fit": without_none(msgspec.to_builtins(result.fit)),
@@ -72,8 +61,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
 
 def unit_rows(result: Fitted) -> list[dict[str, Any]]:
     """Return each unit's measured level and the leading model's prediction without it."""
-    chosen = result.chosen
-    assert chosen.campaigns is not None
+    chosen = result.compared
     name = chosen.leads
     judged, table = chosen.judged[name], chosen.campaigns.table
     rows = []
@@ -90,7 +78,7 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
 
     The unit on which the models differ most comes first.
     """
-    judged = {name: one for name, one in result.chosen.judged.items() if name != BASELINE}
+    judged = {name: one for name, one in result.compared.judged.items() if name != BASELINE}
     own = next(iter(judged.values())).own
     rows = []
     for i, unit in zip(np.flatnonzero(own), result.lab.units, strict=True):
@@ -102,8 +90,7 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
 
 def prior_text(result: Fitted) -> str:
     """State the weight of the stored constants."""
-    settings, chosen = result.lab.settings, result.chosen
-    assert chosen.campaigns is not None
+    settings, chosen = result.lab.settings, result.compared
     count = int(np.sum(~chosen.campaigns.own))
     if not count:
         return "Only the lab's own units count: nothing is shrunk."
@@ -143,7 +130,7 @@ def against_text(one: ModelFit) -> str:
 
 def leads_text(result: Fitted) -> str:
     """Say which model leads, by which rule, and the test that decided."""
-    judged = result.chosen.judged
+    judged = result.compared.judged
     errors = {name: np.abs(one.errors[one.own]) for name, one in judged.items()}
     lead = result.fit.leads
     tests = [
@@ -160,16 +147,13 @@ def leads_text(result: Fitted) -> str:
 
 def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
     """Return title, table with its head, and remarks of each section, for the page and the terminal."""
-    chosen, by_source = result.chosen, result.by_source.items()
+    chosen = result.compared
     models = [["model", "leave-one-out", "own units", "own, stored constants", "against the baseline", "coverage"]]
     for name in chosen.order:
         one = result.fit.model[name]
         own = ["-" if value is None else f"{value:.2f}" for value in (one.own_leave_one_out, one.own_by_stored)]
         score = f"{one.leave_one_out:.2f} ({one.leave_one_out_low:.2f} to {one.leave_one_out_high:.2f})"
         models.append([name, score, *own, against_text(one), one.coverage])
-    moduli = [["moduli", *chosen.judged]]
-    for source, compared in by_source:
-        moduli.append([source, *(f"{compared.judged[n].score:.2f}" if compared.judged else "-" for n in chosen.judged)])
     units = [["unit", "measured", "predicted", "P10", "P90"]]
     for row in unit_rows(result):
         numbers = (f"{row[key]:.3g}" for key in ("measured", "predicted", "p10", "p90"))
@@ -195,29 +179,9 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
                 "80 % range, which was predicted without them.",
             ],
         ),
-        (
-            "Leave-one-out error, by source of the moduli",
-            moduli,
-            [f"{source}: {one.reason}." for source, one in by_source if one.reason],
-        ),
         ("Units", units, [f"Predicted without the unit by {chosen.leads}; 80 % intervals."]),
         ("Units on which the models differ most", differing, [DIFFERING]),
     ]
-
-
-def page(result: Fitted) -> str:
-    """Return the result as Markdown."""
-    settings = result.lab.settings
-    paper = " in addition to the paper's nine" if settings.include_paper_units else ""
-    lines = [f"# Models fitted with the units of {settings.name}", "", *([settings.note, ""] if settings.note else [])]
-    lines += [f"{result.fit.units} units of the lab's own{paper}, {settings.moduli} moduli.", ""]
-    for title, (head, *rows), remarks in sections(result):
-        lines += [f"## {title}", ""]
-        lines += [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
-        lines += [f"\n{remark}" for remark in remarks]
-        lines += ["", *(["![predicted against measured](fit.svg)", ""] if title == "Units" else [])]
-    lines += ["## Files that were read", "", *(f"- {one.file}: SHA-256 {one.sha256}" for one in result.fit.input)]
-    return "\n".join(lines) + "\n"
 
 
 def _chart(result: Fitted) -> str:
@@ -245,7 +209,7 @@ def fit(
             "-o",
             "--out",
             metavar="DIR",
-            help="Folder for lab-fit.toml, fit.json, fit.md and fit.svg. Default: only print.",
+            help="Folder for lab-fit.toml, fit.json and fit.svg. Default: only print.",
         ),
     ] = None,
     as_json: AsJson = False,

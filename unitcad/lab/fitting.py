@@ -1,24 +1,22 @@
-"""A lab's units together with the paper's: leave-one-out errors by each source of moduli, and the fit."""
+"""A lab's units together with the paper's: leave-one-out errors and the fit."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, field
-from msgspec.structs import replace
 from scipy.special import stdtrit
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, Moduli, coordinates_of, measured_table, nominal
+from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, coordinates_of, measured_table, nominal
 from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, SEED, Model, leader
 from unitcad.attenuation.edge.ranges import InputFile, LabFit, ModelFit, OwnLevel, unit_key
-from unitcad.attenuation.inputs import EstimateInput, Quantity
-from unitcad.catalogue import materials
+from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue.entries import Frequency, MaterialEntry
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input
@@ -136,7 +134,7 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
     if table.measured is not None:
         field = f"{where}.measured"
         path = file_of(folder, table.measured, field)
-        level, measured_hz, chain = _measured(field, table, path, inputs.get(source or ""))
+        level, measured_hz, chain = _measured(field, table, path)
         inputs[table.measured] = files.sha256(path)
         hertz, said = hertz or measured_hz, f"{table.measured}, chain {chain}"
     assert level is not None
@@ -149,12 +147,8 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
     return OwnUnit(table.name, asked, built, hertz, level, f"{said}, {walls}" if walls else said)
 
 
-def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | None) -> tuple[LevelTable, float, str]:
-    """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by the file's first chain.
-
-    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. If a campaign
-    names a spec and the fit a cast record, nothing is compared.
-    """
+def _measured(where: str, table: FitUnitTable, path: Path) -> tuple[LevelTable, float, str]:
+    """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by its first chain."""
     data = read_toml(path)
     chain, rows = data.get("chain"), data.get("level")
     if data.get("status") != "measured" or not isinstance(rows, list):
@@ -167,20 +161,9 @@ def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | 
     hertz = row.get("frequency_hz")
     if not isinstance(hertz, int | float):
         raise Refusal(f"{where}.frequency_hz", hertz, "must be a number")
-    key = "cast" if table.cast is not None else "spec"
-    there, here = row.get(key), getattr(table, key)
-    if there is not None:
-        sha256 = next((one.get("sha256") for one in data.get("source", ()) if one.get("file") == there), None)
-        if sha256 and source_sha256 and sha256 != source_sha256:
-            raise Refusal(where, table.measured, f"was measured with another {here}: its SHA-256 differs")
-        if not sha256 and not source_sha256 and there != here:
-            raise Refusal(where, table.measured, f"was measured of the template {there}, not {here}")
-        if row.get("cavity", table.cavity) != table.cavity:
-            raise Refusal(where, table.measured, f"was measured of cavity {row['cavity']}, not {table.cavity}")
     return level, float(hertz), str(chain)
 
 
-SOURCES: tuple[Moduli, ...] = get_args(Moduli)
 LEAST_ALONE = 6
 """Units of a lab without the paper's: with one left out and four class means fitted, one degree of freedom remains."""
 _WIDEST = 10.0
@@ -191,13 +174,11 @@ _SIDES = 0.95
 
 @dataclass(frozen=True)
 class Compared:
-    """All models by one source of moduli: the units, judged, fitted for the lab; or why there is none."""
+    """All models: the units, judged, fitted for the lab."""
 
-    moduli: Moduli
-    campaigns: Campaigns | None
+    campaigns: Campaigns
     judged: dict[str, Judged]
     fitted: dict[str, Shrunk]
-    reason: str = ""
 
     @property
     def leads(self) -> str:
@@ -227,7 +208,6 @@ class Compared:
         constants = self.fitted[name].constants
         if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
             return "kappa"
-        assert self.campaigns is not None
         read = gradients(COMPARED[name], self.campaigns.table, constants)
         unread = ~read.any(axis=0)
         if name == BASELINE or (not unread.any() and np.linalg.matrix_rank(read) == read.shape[1]):
@@ -237,16 +217,11 @@ class Compared:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The study of a lab: the chosen source of moduli, the other sources, and the fit for an estimate."""
+    """The study of a lab, and the fit for an estimate."""
 
     lab: FitLab
-    by_source: dict[str, Compared]
+    compared: Compared
     fit: LabFit
-
-    @property
-    def chosen(self) -> Compared:
-        """The comparison by the lab's own choice of moduli."""
-        return self.by_source[self.lab.settings.moduli]
 
 
 def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fitted:
@@ -255,18 +230,20 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
     if not settings.include_paper_units and len(lab.units) < LEAST_ALONE:
         limit = f"{len(lab.units)} units; without the paper's {LEAST_ALONE} are needed"
         raise Refusal("unit", None, limit)
-    by_source: dict[str, Compared] = {}
-    for moduli in SOURCES:
-        say(f"{moduli} moduli")
-        by_source[moduli] = _compared(lab, moduli)
-    chosen = by_source[settings.moduli]
-    if chosen.campaigns is None:
-        raise Refusal("moduli", settings.moduli, chosen.reason)
-    leads, measured = chosen.leads, []
-    model, constants = COMPARED[leads], chosen.fitted[leads].constants
-    for unit in lab.units:
+    say("models")
+    inputs = [_input(unit, settings.moduli) for unit in lab.units]
+    for i, one in enumerate(inputs):
+        for at, layer in enumerate(one.layers):
+            if not layer.youngs_modulus.known:
+                limit = f"unit.{i}.layers.{at}: {layer.material}: no modulus is known"
+                raise Refusal("moduli", settings.moduli, limit)
+    campaigns = campaigns_of(lab, inputs)
+    judged = {name: judge(model, campaigns) for name, model in COMPARED.items()}
+    compared = Compared(campaigns, judged, {name: shrunk(model, campaigns) for name, model in COMPARED.items()})
+    leads, measured = compared.leads, []
+    model, constants = COMPARED[leads], compared.fitted[leads].constants
+    for unit, built in zip(lab.units, inputs, strict=True):
         variant, level = estimate_input(unit.spec, unit.frequency_hz), unit.level
-        built = _input(unit, settings.moduli)
         predicted = float(model.logs(nominal(built), constants)[0])
         measured.append(
             OwnLevel(
@@ -280,26 +257,15 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
         format=1, name=settings.name, units=len(lab.units), moduli=settings.moduli,
         include_paper_units=settings.include_paper_units,
         between_labs=settings.between_labs, seed=SEED, leads=leads,  # pyright: ignore[reportArgumentType]
-        model={name: _entry(one, name, chosen) for name, one in COMPARED.items()},
+        model={name: _entry(one, name, compared) for name, one in COMPARED.items()},
         measured=measured, input=list(lab.inputs),
     )  # fmt: skip
-    return Fitted(lab, by_source, fit)
+    return Fitted(lab, compared, fit)
 
 
-def _compared(lab: FitLab, moduli: Moduli) -> Compared:
-    inputs = [_input(unit, moduli) for unit in lab.units]
-    for i, variant in enumerate(inputs):
-        for at, layer in enumerate(variant.layers):
-            if not layer.youngs_modulus.known:
-                return Compared(moduli, None, {}, {}, f"unit.{i}.layers.{at}: {layer.material}: no modulus is known")
-    campaigns = campaigns_of(lab, inputs, moduli)
-    judged = {name: judge(model, campaigns) for name, model in COMPARED.items()}
-    return Compared(moduli, campaigns, judged, {name: shrunk(model, campaigns) for name, model in COMPARED.items()})
-
-
-def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Campaigns:
+def campaigns_of(lab: FitLab, inputs: list[EstimateInput]) -> Campaigns:
     """Return the paper's units, if they are wanted, and the lab's own after them."""
-    paper = measured_table(moduli)
+    paper = measured_table(lab.settings.moduli)
     paper = paper.rows(list(range(len(paper.names))) if lab.settings.include_paper_units else [])
     table = MeasuredTable(
         (*paper.names, *(unit.name for unit in lab.units)),
@@ -313,27 +279,16 @@ def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Ca
     return Campaigns(table, own, error, lab.settings.between_labs)
 
 
-def _input(unit: OwnUnit, moduli: Moduli) -> EstimateInput:
-    """Return a unit's input by one source of moduli."""
+def _input(unit: OwnUnit, moduli: str) -> EstimateInput:
+    """Return the input of a unit as built, by a source of moduli."""
     data = to_data(unit.built)
-    data["estimate"]["moduli"] = "small-strain" if moduli == "data sheet" else moduli
-    variant = estimate_input(from_data(data), unit.frequency_hz)
-    if moduli != "data sheet":
-        return variant
-    known = materials(unit.built.materials)
-    return replace(
-        variant,
-        layers=tuple(
-            replace(layer, youngs_modulus=Quantity(1e3 * float(known[layer.material].modulus_100pct_kpa)))
-            for layer in variant.layers
-        ),
-    )
+    data["estimate"]["moduli"] = moduli
+    return estimate_input(from_data(data), unit.frequency_hz)
 
 
 def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
 
     judged, found, campaigns = compared.judged[name], compared.fitted[name], compared.campaigns
-    assert campaigns is not None
     spread = stdtrit(found.df, _SIDES) * found.sigma * np.sqrt(np.diag(found.covariance))
     wide = np.exp(np.minimum(spread, _WIDEST))
     paper = ~campaigns.own

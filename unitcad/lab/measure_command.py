@@ -6,7 +6,6 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from html import escape
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,7 +20,6 @@ from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
 from unitcad.errors import UnitcadError
 from unitcad.export.chart import Series, chart
-from unitcad.files import sha256
 from unitcad.lab import measuring
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measuring import Measured
@@ -55,15 +53,12 @@ def _place(distance_mm: float) -> str:
 def measured_table(result: Measured) -> dict[str, Any]:
     """Return measured.toml's data: a level per unit, place and chain, and the hash of every record behind them."""
     campaign = result.campaign
-    units = {unit.name: unit for unit in campaign.unit}
     levels = []
     for one in result.levels:
-        unit, found = units[one.unit], one.level
-        source = {"spec": unit.spec} if unit.spec else {"cast": unit.cast} if unit.cast else {}
-        source |= {"cavity": unit.cavity} if unit.cavity else {}
+        found = one.level
         levels.append(
             {
-                "unit": one.unit, **source, "distance_mm": one.distance_mm,
+                "unit": one.unit, "distance_mm": one.distance_mm,
                 "value": found.value, "low": found.low, "high": found.high, "status": "measured", "chain": one.chain,
                 "frequency_hz": one.frequency_hz, "repeats": found.repeats, "scatter": found.scatter,
             }
@@ -72,11 +67,10 @@ def measured_table(result: Measured) -> dict[str, Any]:
         {"unit": unit, "place": record.role, "file": record.file, "sha256": record.sha256, "usable": record.usable}
         for unit, record in _each_record(result)
     ]
-    sources = [{"file": name, "sha256": found} for name, found in result.specs.items()]
     assumed = {"assumed": result.assumed} if result.assumed else {}
     return {
         "name": campaign.name, "status": "measured", "chain": campaign.chain.use[0], "interval": 0.95, **assumed,
-        "level": rounded(levels, 6), "record": records, "source": sources,
+        "level": rounded(levels, 6), "record": records,
     }  # fmt: skip
 
 
@@ -294,7 +288,6 @@ def measure(
     folder = out or Path("out") / f"measure-{campaign.stem}"
     with progress(asked.name) as say:
         result = measuring.measure(asked, campaign.parent, say)
-        result = replace(result, specs={campaign.name: sha256(campaign), **result.specs})
         say("files")
         write(result, folder)
     for finding in result.findings:

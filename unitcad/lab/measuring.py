@@ -18,7 +18,6 @@ import numpy as np
 from scipy.stats import t
 
 from unitcad.errors import Refusal
-from unitcad.files import sha256
 from unitcad.lab.campaign import (
     Campaign,
     SensorTable,
@@ -27,7 +26,6 @@ from unitcad.lab.campaign import (
 )
 from unitcad.lab.chains import Chain, chains_of
 from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, finding, measure_record
-from unitcad.lab.unit_files import source_file
 
 COVERAGE = 0.95
 LEAST_REPEATS = 3
@@ -93,13 +91,12 @@ class PlaceLevel:
 
 @dataclass(frozen=True)
 class Measured:
-    """A campaign's result: levels, records by unit, findings, hashes of its other files."""
+    """A campaign's result: levels, records by unit, findings."""
 
     campaign: Campaign
     levels: tuple[PlaceLevel, ...]
     records: dict[str, tuple[RecordResult, ...]]
     findings: tuple[LabFinding, ...]
-    specs: dict[str, str]
 
     @property
     def chains(self) -> tuple[Chain, ...]:
@@ -122,17 +119,14 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
-    specs: dict[str, str] = {}
-    for i, unit in enumerate(campaign.unit):
-        if name := source_file(unit, folder, f"unit.{i}"):
-            specs[name] = sha256(folder / name)
+    for unit in campaign.unit:
         records[unit.name] = tuple(one := _records(unit, campaign, folder, stated, say))
         findings += [finding for record in one for finding in record.findings]
         for role, distance, _ in sorted(_places(unit), key=itemgetter(1)):
             more, said = _levels(unit, role, distance, one, campaign)
             levels += more
             findings += said
-    return Measured(campaign, tuple(levels), records, tuple(findings), specs)
+    return Measured(campaign, tuple(levels), records, tuple(findings))
 
 
 def _sensors(campaign: Campaign) -> tuple[SensorTable, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Floats
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable
 from unitcad.lab.chains import LineFit, chains_of
 from unitcad.lab.chains.line import clip_level, fit_line, spectrum
@@ -104,8 +104,6 @@ LONGEST_S = 60.0
 """Seconds of a record that is measured: the line of a longer one has too many parameters to be fitted at once."""
 IRREGULAR = 0.3
 """Largest distance of a time from an even grid, in steps."""
-ON_GRID = 0.1
-"""The same for times among which some are lost."""
 SAME_RATE = 1e-3
 """Part by which the campaign's rate may differ from the file's own."""
 HIGHEST_RATE = 5_000.0
@@ -169,16 +167,7 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     ]
     samples = recording.columns(columns)
     count, missing = len(samples), tuple(int(n) for n in np.count_nonzero(~np.isfinite(samples), axis=0))
-    off_grid = 0.0
-    if stamps is not None:
-        off_grid = _off_grid(stamps, rate)
-        if off_grid > IRREGULAR and (places := _places(stamps)) is not None:
-            # A logger that lost samples: their places on the even grid stay empty.
-            whole = np.full((places[-1] + 1, samples.shape[1]), np.nan)
-            whole[places] = samples
-            rate, off_grid = float(places[-1] / (stamps[-1] - stamps[0])), 0.0
-            missing = tuple(int(n + len(whole) - count) for n in missing)
-            samples, count = whole, len(whole)
+    off_grid = 0.0 if stamps is None else _off_grid(stamps, rate)
     if (length := count / rate) > LONGEST_S:
         raise Refusal(shown, None, f"lasts {length:.4g} s; cut the record to {LONGEST_S:g} s or less")
     samples = samples * factors
@@ -192,18 +181,6 @@ def _off_grid(stamps: Floats, rate: float) -> float:
     """Return the largest distance of a time from an even grid, in steps."""
     off = np.abs((stamps - stamps[0]) * rate - np.arange(len(stamps)))
     return float(off.max()) if np.isfinite(off).all() else np.inf
-
-
-def _places(stamps: Floats) -> Ints | None:
-    """Return the times' places on an even grid of at most twice as many; None if a time is off it."""
-    steps = np.diff(stamps)
-    if not (np.isfinite(stamps).all() and (steps > 0).all()):
-        return None
-    step = float(np.median(steps))
-    places = np.cumsum(np.concatenate([[0], np.round(steps / step)])).astype(int)
-    step = float((stamps[-1] - stamps[0]) / places[-1])
-    off = np.abs((stamps - stamps[0]) / step - places)
-    return places if off.max() <= ON_GRID and np.diff(places).min() > 0 and places[-1] < 2 * len(places) else None
 
 
 def _factor(sensor: SensorTable, own: str, shown: str) -> float:

@@ -12,7 +12,6 @@ from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.files import path_seen_from
 from unitcad.search import design_files
-from unitcad.search.proposals import explain as explained
 from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target
 
@@ -22,12 +21,6 @@ def design(
         str, typer.Argument(metavar="TARGET", help="Target file, or name of a shipped one (unitcad list targets).")
     ],
     out: Out = Path("out"),
-    explain: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|SPEC", help="Explain why a unit is not proposed, and write nothing. Default: propose units."
-        ),
-    ] = None,
     no_check: Annotated[
         bool, typer.Option("--no-check", help="Skip the moulds: the best unit may not be castable.")
     ] = False,
@@ -40,22 +33,11 @@ def design(
     """
 
     asked = load_target(target)
-    if explain is None:
-        design_files.check_out(out)
+    design_files.check_out(out)
     with progress("design") as stage:
         made = invert(asked, check=not no_check, say=stage)
-        if explain is None:
-            folder = design_files.folder_of(asked.name, out)
-            found = design_files.contents(made, path_seen_from(folder), stage)
-            design_files.write(folder, found)
-    if explain is not None:
-        reasons = explained(made, explain)
-        if as_json:
-            print_json(reasons)
-        else:
-            for line in design_files.explanation_lines(reasons):
-                console().print(line, soft_wrap=True)
-        return
+        folder = design_files.folder_of(asked.name, out)
+        design_files.write(folder, design_files.contents(made, path_seen_from(folder), stage))
     data = design_files.with_files(made.data, path_seen_from(folder))
     if as_json:
         print_json({"folder": str(folder), **data})

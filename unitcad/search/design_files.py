@@ -1,4 +1,4 @@
-"""A result's folder: the ranking, the page, the same as Markdown and as JSON, charts, and a spec for each proposal."""
+"""A result's folder: the ranking, the page, the same as JSON, and a spec for each proposal."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ import numpy as np
 
 from unitcad import files
 from unitcad.errors import UnitcadError
-from unitcad.export.chart import Series, chart
 from unitcad.pipeline import write as folders
 from unitcad.pipeline.variant import Variant
 from unitcad.report.html_page import drawing, plain_page
-from unitcad.search.candidates import Candidates, Say, limits
+from unitcad.search.candidates import Say, limits
 from unitcad.search.proposals import Inversion, name_of, order_rows
 from unitcad.spec import to_toml
-from unitcad.text import cell, join_words, markdown, number
+from unitcad.text import cell, join_words, number
 
 OTHERS = "Next candidates: measured outside the target, or below the required probability"
 """The heading over the candidates that are no proposals."""
@@ -130,28 +129,7 @@ def lines(one: Mapping[str, Any]) -> list[str]:
     return [*made, one["lengths_gain"], *one["remarks"]]
 
 
-def explanation_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return an answer of `explain`."""
-    head = data["name"]
-    if data["probability"] is not None:
-        place = f", place {data['rank']} of {data['of']}" + ("" if data["among"] else " if it were tried")
-        head += f": {level_line(data)}{place if data['rank'] else ''}"
-    elif data["measured"]:
-        head += f": {measured_words(data['measured'])}"
-    is_proposal = data["listed"] and not data["nearest_other"]
-    among = [f"it is among the proposals, as number {data['listed']}"] if is_proposal else []
-    return [head, *(f"  {line}" for line in [*among, *data["reasons"]])]
-
-
 SPECS = "specs"
-_QUANTITIES = {
-    "mass_g": "mass, g",
-    "cure_hours": "hours until it is out of the mould",
-    "height_mm": "height, mm",
-    "diameter_mm": "diameter, mm",
-    "crosstalk": "crosstalk ratio",
-}
-"""Columns of the candidates, of which less may cost probability."""
 _COLUMNS = (
     "place", "proposal", "name", "design", "motor", "materials", "walls_mm", "caps_mm", "diameter_mm", "height_mm",
     "mass_g", "cure_hours", "crosstalk_ratio", "probability", "edge_p10", "edge_p50", "edge_p90", "measured", "over",
@@ -176,13 +154,10 @@ def contents(made: Inversion, folder: str, say: Say = lambda stage: None) -> dic
     say("files")
     data = with_files(made.data, folder)
     specs = {Path(one["file"]).name: spec for one, spec in zip(data["proposals"], made.specs, strict=True)}
-    charts = front_charts(made)
     texts = {
         **{f"{SPECS}/{name}": to_toml(spec) for name, spec in specs.items()},
-        **charts,
         "ranking.csv": ranking(made),
-        "design.md": page(data, charts),
-        "design.html": html_page(data, charts, [Variant(spec).section() for spec in made.specs]),
+        "design.html": html_page(data, [Variant(spec).section() for spec in made.specs]),
         "design.json": json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
     }
     return {name: text.encode() for name, text in texts.items()}
@@ -195,15 +170,10 @@ def with_files(data: Mapping[str, Any], folder: str) -> dict[str, Any]:
 
 
 def write(folder: Path, made: Mapping[str, bytes]) -> None:
-    """Put the files in place of an earlier result's, all or none; other files in the folder stay."""
+    """Put the files in place of an earlier result's; other files in the folder stay."""
     folders.expect_folder(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    folders.clear_leftovers(folder.parent)
-    with folders.replacing(folder) as fresh:
-        (fresh / SPECS).mkdir()
-        for name, content in made.items():
-            files.write_new(fresh / name, content)
-    for earlier in [*folder.glob(f"{SPECS}/[1-9]-*.toml"), *folder.glob("front-*.svg")]:
+    files.replace_all(folder, made, "design.json")
+    for earlier in folder.glob(f"{SPECS}/[1-9]-*.toml"):
         if earlier.relative_to(folder).as_posix() not in made:
             earlier.unlink()
 
@@ -236,47 +206,7 @@ def ranking(made: Inversion) -> str:
     return text.getvalue()
 
 
-def front(found: Candidates, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the rows that no other one beats in both: a higher probability and a smaller value; by rising value."""
-    order = rows[np.lexsort((rows, -found.probability[rows], values[rows]))]
-    best = np.maximum.accumulate([-1.0, *found.probability[order]])
-    return order[found.probability[order] > best[:-1] + 1e-9]
-
-
-def front_charts(made: Inversion) -> dict[str, str]:
-    """Return a chart of the probability over each quantity of which less costs probability, by file name."""
-    found, rows, proposals, charts = made.found, made.rows, made.data["proposals"], {}
-    for key, name in _QUANTITIES.items():
-        values = getattr(found, key)
-        best = front(found, rows, values)
-        if np.all(np.isfinite(values[rows])) and best.size > 1:
-            own = [one[key]["value"] if key == "crosstalk" else one[key] for one in proposals]
-            series = [
-                Series("candidates", values[rows], found.probability[rows], points=True),
-                Series("front: nothing is better in both", values[best], found.probability[best]),
-                Series("proposals", own, [one["probability"] for one in proposals], points=True),
-            ]
-            charts[f"front-{key}.svg"] = chart(series, f"{rows.size} candidates", name, "probability of the level")
-    return charts
-
-
-def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
-    """Return the result as Markdown."""
-    made = [f"# {markdown(data['name'])}: {target_line(data['target'])}", ""]
-    made += [f"{'; '.join(head_lines(data))}.", ""]
-    for i, one in enumerate(data["proposals"]):
-        if is_first_other(data["proposals"], i):
-            made += [f"*{OTHERS}.*", ""]
-        made += [f"## {markdown(title(one))}", "", f"**{markdown(level_line(one))}**", ""]
-        made += [f"- {markdown(line)}" for line in lines(one)]
-        made += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
-    made += [f"![probability of the level]({name})\n" for name in charts]
-    if skipped := skipped_lines(data):
-        made += ["## Skipped", "", *(f"- {markdown(line)}" for line in skipped), ""]
-    return "\n".join(made)
-
-
-def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequence[str]) -> str:
+def html_page(data: Mapping[str, Any], sections: Sequence[str]) -> str:
     """Return the page of a result; `sections`: the SVG of each proposal."""
     tried, *ranks = (escape(line) for line in head_lines(data))
     refused = [
@@ -297,9 +227,7 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
             f"<p>Build it: <code>unitcad build {escape(shlex.quote(one['file']))}</code></p></section>"
             for one, section in proposals
         ),
-        "<section><h2>Less costs probability</h2>",
-        *(drawing(svg, "probability of the level, with the front") for svg in charts.values()),
-        f"</section><section><h2>Tried</h2><p>{tried}. All of them are in ranking.csv.</p>",
+        f"<section><h2>Tried</h2><p>{tried}. All of them are in ranking.csv.</p>",
         f"{_list([*skipped_lines(data), *refused])}</section>",
     ]
     return plain_page(f"{data['name']}: designs", "\n".join(body))
