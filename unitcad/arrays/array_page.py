@@ -122,7 +122,7 @@ def tools_model(array: Array) -> dict[str, Any]:
     }
 
 
-CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
+CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg"), "circuit.svg"
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
 SIDES = ("skin-side", "bent", "back")
@@ -133,7 +133,6 @@ WORDS = {
     "tools.png": "Tools and cast silicone, taken apart",
     "crosstalk-patch.svg": "Vibration at each unit from all others, on the patch",
     "crosstalk.svg": "Crosstalk from each unit (row) to each other one (column)",
-    "crosstalk-edge.svg": "The same, at the nearest edge of the other unit",
     "circuit.svg": "Outline of the circuit, pads and rows",
 }
 ARRAY_FILE = "array.toml"
