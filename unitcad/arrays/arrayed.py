@@ -325,7 +325,7 @@ def _record(array: Array, folders: list[str]) -> dict[str, Any]:
             }
             for p in array.places
         ],
-        "covered_tails": [asdict(tail) for tail in covered_tails(array)],
+        "covered_tails": list(covered_tails(array)),
     }
 
 

@@ -13,7 +13,7 @@ from itertools import chain, pairwise
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
-from unitcad.checks.draw import BLOCKED, blocked_area
+from unitcad.checks.draw import BLOCKED, blocked
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
 from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
@@ -83,8 +83,8 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
         yield at_most("C250", f"{where}: overlap", float((piece ^ other).volume()), OVERLAP, "mm3")
         narrowest = float(piece.min_gap(other, least + 1))
         yield at_least("C250", f"{where}: narrowest gap", narrowest, least - GRID, "mm", too_tight(lengths))
-        facing = min(blocked_area(other, piece, (0, 0, way)) for way in (1, -1))
-        yield at_most("C250", f"{where}: slide together", facing, BLOCKED, "mm2", "one piece is caught in the other")
+        caught = min(sum(blocked(other, {name: piece}, (0, 0, way)).values()) for way in (1, -1))
+        yield at_most("C250", f"{where}: slide together", caught, BLOCKED, "mm3", "one piece is caught in the other")
     missing = "something of the tool is missing"
     yield at_most("C250", f"{split.tool}: widest gap", _widest(gap), play + GRID, "mm", missing)
 
