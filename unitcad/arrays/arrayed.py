@@ -114,7 +114,7 @@ class Arrayed(Compound):
         cls,
         names: Sequence[str],
         sets: Sequence[str],
-        hertz: Sequence[float],
+        hertz: float | None,
         details: bool,
         as_json: bool,
     ) -> None:

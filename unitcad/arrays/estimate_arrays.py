@@ -60,15 +60,13 @@ _HOW = "root of the sum of squares, or sum in phase"
 
 
 def estimate_arrays(
-    names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], details: bool, as_json: bool
+    names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool
 ) -> None:
     """Print the crosstalk of arrays and, of several, each over the first."""
-    if len(hertz) > 1:
-        raise Refusal("--frequency", list(hertz), "an array's crosstalk is at one frequency", hertz[0])
     for name in names:
         if not compound_kind(name):
             raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
-    own = [f"estimate.frequency_hz={hertz[0]!r}"] if hertz else []
+    own = [f"estimate.frequency_hz={hertz!r}"] if hertz else []
     arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]
     with progress("crosstalk") as stage:
         every = [crosstalk(array, stage) for array in arrays]
