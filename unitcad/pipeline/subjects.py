@@ -60,7 +60,7 @@ class Compound(Subject):
         details: bool,
         as_json: bool,
     ) -> None:
-        """Print the estimate of one or several. `hertz`: the frequency of the drive; None: the motor's. Raises Refusal."""
+        """Print the estimate of one or several. `hertz`: the drive's frequency; None: the motor's. Raises Refusal."""
 
     @abstractmethod
     def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
