@@ -91,6 +91,9 @@ def test_places_are_those_of_the_polygons(judge):
         assert place.face < 5
         assert lines[place.line - 1] == "f " + " ".join(str(i + 1) for i in QUADS[place.face])
         assert place.object == ("body" if place.face < 3 else "the lid # 1")
+    text = ply(CUBE_CORNERS * 10, QUADS[:-1], "").decode()
+    hole = finding(judge(text, "a.ply"), "T001")
+    assert all(text.split("\n")[place.line - 1][:2] == "4 " for place in hole.locations)
 
 
 def test_groups_name_faces_where_there_is_no_object(judge):
