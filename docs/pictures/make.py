@@ -20,6 +20,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1] / "tests" / room) for room in ("report", "serve")]
 
 import chromium  # noqa: E402
+import numpy as np  # noqa: E402
 from live import WALL, Live  # noqa: E402
 from PIL import Image  # noqa: E402
 from running import serving  # noqa: E402
@@ -30,15 +31,19 @@ from unitcad.arrays.array_page import pictures as patch_pictures  # noqa: E402
 from unitcad.arrays.crosstalk import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch import patch_moulds  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
-from unitcad.lab.phantom import load_phantom, phantom_set  # noqa: E402
-from unitcad.lab.phantom_command import box_picture  # noqa: E402
+from unitcad.export.raster import Surface, draw  # noqa: E402
+from unitcad.kernels import mesh  # noqa: E402
+from unitcad.lab.phantom import SEGMENTS, PhantomSet, load_phantom, phantom_set  # noqa: E402
 from unitcad.pipeline.scenes import exploded_view, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.pipeline.write import build  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
+from unitcad.shape.tree import Body  # noqa: E402
 from unitcad.validation import compound_kind, load  # noqa: E402
 
 ARRAY_PICTURES = {"skin-side": "patch-skin-side", "tools": "tools"}
 MOST_BYTES = 250_000
+APART_MM = 14.0
+"""Between two pieces of a box taken apart."""
 LOOKS = (("light", 1280, 900, False), ("dark", 1280, 900, True), ("narrow", 390, 844, False))
 
 
@@ -75,8 +80,27 @@ def pictures() -> dict[str, bytes]:
     made["film-closed-pour2.png"] = step_in_section(film, 2)
     made["dome-unit.png"] = unit_cut_open(dome)
     made["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
-    made["phantom-box.png"] = box_picture(phantom_set(load_phantom("skin")))
+    made["phantom-box.png"] = box_taken_apart(phantom_set(load_phantom("skin")))
     return {name: small(image) for name, image in made.items()}
+
+
+def box_taken_apart(phantom: PhantomSet) -> bytes:
+    """Draw the box of a phantom taken apart, as a PNG file."""
+    shown = [body for body in phantom.tools if body.kind != "blade"]
+
+    def place(body: Body) -> tuple[float, bool]:
+        """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
+        _, _, low, _, _, high = mesh.bounds(mesh.realise(body.shape, SEGMENTS))
+        return (low if body.kind == "base" else high, body.kind == "layer")
+
+    bodies = sorted([*shown, *phantom.layers], key=place)
+    parts, height = [], 0.0
+    for body in bodies:
+        vertices, faces = mesh.arrays(mesh.realise(body.shape, SEGMENTS))
+        low, high = vertices[:, 2].min(), vertices[:, 2].max()
+        parts.append(Surface(vertices + np.array([0.0, 0.0, height - low]), faces, body.colour, body.name))
+        height += (high - low) + APART_MM
+    return draw(parts, (1.0, -2.0, 0.7), (1200, 900))
 
 
 def gallery() -> dict[str, bytes]:

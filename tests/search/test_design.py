@@ -39,17 +39,13 @@ def known():
 
 def test_the_answer_that_is_known(known):
     best = known.data["proposals"]
-    found = [(one["design"], one["materials"][1], one["nearest_other"]) for one in best]
-    assert found[:2] == [
-        ("encapsulating", "dragon-skin-10-medium", False),
-        ("encapsulating", "dragon-skin-30", False),
-    ]
-    assert all(one["nearest_other"] for one in best[2:])
-    assert [one["equal_to"] for one in best[:2]] == [None, 1]
+    found = [(one["design"], one["materials"][1]) for one in best]
+    assert found == [("encapsulating", "dragon-skin-10-medium"), ("encapsulating", "dragon-skin-30")]
+    assert [one["equal_to"] for one in best] == [None, 1]
     for one in best:
         expected = predictive_of([estimate_input(spec) for spec in known.specs if spec.name == one["name"]])
         assert one["probability"] == pytest.approx(expected.at_most(0.06)[0], rel=1e-6)
-    assert all("only ones within the limits" in one["lengths_gain"] for one in best)
+    assert all(one["lengths_gain"] == "no other lengths meet the target" for one in best)
     assert set(known.data["skipped"]) == {"ecoflex-00-30", "ecoflex-00-50"}
     assert [one["measured"]["level"] for one in best[:2]] == [0.04, 0.0517]
     assert all(one["checks"] > 20 for one in best)
@@ -133,7 +129,6 @@ def test_walls_of_two_millimetres_do_not_bring_an_open_ring_to_six_per_cent():
     [
         ({"edge_max": 0.03}, "target.edge_max"),
         ({"edge_max": None, "edge_min": 0.95}, "target.edge_min"),
-        ({"edge_max": 0.06, "edge_min": 0.055}, "target.edge_min"),
         ({"diameter_max_mm": 9.0}, "target.diameter_max_mm"),
         ({"height_max_mm": 1.9}, "target.height_max_mm"),
         ({"mass_max_g": 0.3}, "target.mass_max_g"),
@@ -168,7 +163,7 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
         kept = {key: ends[key] for key in ends if rng.random() < 0.5}
         goals = {key: round(float(rng.uniform(*of)), 2) for key, of in kept.items()}
         level = float(np.exp(rng.uniform(np.log(0.01), np.log(0.2))))
-        goals |= {"edge_max": level} if i % 3 else {"edge_max": level, "edge_min": 0.9 * level}
+        goals |= {"edge_max": level} if i % 3 else {"edge_max": None, "edge_min": 1.2 - level}
         if "pitch_mm" in goals:
             goals["crosstalk_ratio_max"] = float(np.exp(rng.uniform(np.log(0.02), 0.0)))
         try:
@@ -178,15 +173,6 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
             assert invert(_target(**_changed(goals, refused)), check=False).data["proposals"], goals
     assert refusals > targets / 2
     assert several > targets / 6
-
-
-def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk():
-    goals = {"pitch_mm": 10.0, "crosstalk_ratio_max": 0.4}
-    with pytest.raises(Refusal, match=r"target\.pitch_mm = 10: none of .*nearest accepted: 18\.3") as refused:
-        invert(_target(**goals), check=False)
-    variant = estimate_input(load("encapsulating"))
-    assert crosstalk_ratio(variant, 1e-3 * refused.value.nearest).value <= 0.4
-    assert crosstalk_ratio(variant, 1e-3 * (refused.value.nearest - 0.1)).value > 0.4
 
 
 def test_a_single_layer_is_tried_as_thick_as_the_measured_controls():

@@ -23,7 +23,7 @@ from unitcad.validation.load import shipped_files
         ({"target": {}}, "target.edge_max", "is required, or edge_min", None),
         ({}, "target", "is required", None),
         ({"target": {"edge_max": 6}}, "target.edge_max", "fraction of the motor's amplitude", 0.06),
-        ({"target": {"edge_max": 0.1, "edge_min": 0.2}}, "target.edge_min", "below edge_max", 0.05),
+        ({"target": {"edge_max": 0.1, "edge_min": 0.2}}, "target.edge_min", "excludes edge_max", None),
         ({"target": {"edge_max": 0.1, "crosstalk_ratio_max": 0.2}}, "target.pitch_mm", "required with", None),
         (
             {"target": {"edge_max": 0.1, "diameter_mm": 9}},

@@ -1,6 +1,6 @@
 """What a measurement of a candidate says about the target."""
 
-from unitcad.search.design_files import is_first_other, level_line
+from unitcad.search.design_files import level_line
 from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target, target_of
 
@@ -20,20 +20,12 @@ def test_a_control_of_a_design_that_is_not_said_is_one_unit():
 
 
 def test_a_unit_measured_outside_the_goals_is_no_proposal():
-    data = invert(target_of({"target": {"edge_min": 0.1, "edge_max": 0.2}}), check=False).data["proposals"]
-    measured = {one["name"]: one for one in data if one["measured"]}
-    outside = measured["embedded-e10-d10-1.25-1.25"]
-    assert outside["nearest_other"]
-    assert "measured 8.9 % (the paper): outside the target" in level_line(outside)
-    assert not data[0]["nearest_other"]
-    assert [one["nearest_other"] for one in data] == sorted(one["nearest_other"] for one in data)
+    data = invert(target_of({"target": {"edge_max": 0.085}}), check=False).data["proposals"]
+    names = [one["name"] for one in data]
+    assert "embedded-e10-d10-1.25-1.25" not in names  # measured: 8.9 %
+    assert [one["measured"] is None for one in data] == sorted(one["measured"] is None for one in data)
     assert [one["rank"] for one in data] == list(range(1, len(data) + 1))
-
-
-def test_what_is_less_probable_than_asked_for_is_called_so():
     data = invert(load_target("published"), check=False).data["proposals"]
-    assert [i for i in range(len(data)) if is_first_other(data, i)] == [2]
-    assert ", below your 50 %, " in level_line(data[2])
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target" in level_line(data[1])
 
 
@@ -42,4 +34,3 @@ def test_a_unit_that_was_measured_within_the_goals_is_never_refused():
     data = invert(target_of(_data(target=goals)), check=False).data
     assert data["proposals"][0]["name"] == "encapsulating-e10-d10-1.25-1.25"
     assert data["proposals"][0]["measured"]["meets"]
-    assert not data["proposals"][0]["nearest_other"]

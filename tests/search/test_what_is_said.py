@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from unitcad.errors import Refusal, UnknownKey
+from unitcad.errors import UnknownKey
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.search.design_files import contents, head_lines, lines, ranking, title
 from unitcad.search.proposals import invert
@@ -86,12 +86,6 @@ def test_the_command_that_builds_is_quoted(paper):
     found = contents(paper, "odd dir/design-published")
     file = f"odd dir/design-published/specs/1-{paper.data['proposals'][0]['name']}.toml"
     assert f"unitcad build '{file}'" in html.unescape(found["design.html"].decode())
-
-
-def test_a_crosstalk_that_is_out_of_reach_says_what_reaches_it():
-    with pytest.raises(Refusal, match=r"; or target\.pitch_mm = 22.* in its place") as refused:
-        _target(crosstalk_ratio_max=0.3, pitch_mm=20)
-    assert "not tried, without a modulus: ecoflex-00-30" in str(refused.value)
 
 
 def test_an_unknown_key_points_at_the_targets_schema(tmp_path):

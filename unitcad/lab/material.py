@@ -25,9 +25,7 @@ _ANY_CASE = ("lbf", "kgf", "kN", "kPa", "psi", "in", "in/in", "Hz")
 _COLUMN_NAMES = {
     "time": r"(?:test )?time|(?:prüf)?zeit|时间",
     "strain": r"(?:(?:engineering|eng\.?|nominal|tensile) )?strain|dehnung|应变",
-    "true_strain": r"(?:true|log\w*|hencky) strain",
     "stress": r"(?:(?:engineering|eng\.?|nominal|tensile) )?stress|spannung|应力",
-    "true_stress": r"(?:true|cauchy) stress",
     "force": r"force|load|standard force|(?:standard)?kraft|力|载荷",
     "travel": r"(?:crosshead )?(?:travel|displacement)|crosshead|extension|stroke|position|(?:standard)?weg|位移",
     "frequency": r"(?:angular )?freq(?:uency|\.)?",
@@ -116,7 +114,7 @@ def read_columns(
         if column:
             wanted[quantity] = column
         elif choice != ("time",):
-            limit = f"{recording.path.name} has no column of {' or '.join(choice[:2])} that is known by name"
+            limit = f"{recording.path.name} has no column of {' or '.join(choice)} that is known by name"
             limit = f"{limit}; declare {choice[0]}=COLUMN:UNIT; its columns: {recording.numbered()}"
             raise Refusal("--column", None, limit)
     rows = recording.columns([at for at, _ in wanted.values()])
@@ -136,12 +134,11 @@ def _unit(text: str, quantity: str) -> float | None:
 
 LEAST_POINTS = 5
 _HEADER_LINES = 200
-_FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 
 
 @dataclass(frozen=True)
 class Specimen:
-    """A specimen and its machine: lengths mm, the cell's full scale N; None if not known.
+    """A specimen: lengths in mm; None if not known.
 
     `crosshead`: the strain is the crosshead's travel over the gauge length, not the specimen's own.
     """
@@ -149,8 +146,6 @@ class Specimen:
     width_mm: float | None = None
     thickness_mm: float | None = None
     gauge_mm: float | None = None
-    area_mm2: float | None = None
-    cell_n: float | None = None
     crosshead: bool | None = None
 
     def over(self, other: Specimen) -> Specimen:
@@ -161,9 +156,9 @@ class Specimen:
     @property
     def area(self) -> float | None:
         """Cross-section, m2."""
-        if self.width_mm is not None and self.thickness_mm is not None:
-            return self.width_mm * self.thickness_mm * 1e-6
-        return None if self.area_mm2 is None else self.area_mm2 * 1e-6
+        if self.width_mm is None or self.thickness_mm is None:
+            return None
+        return self.width_mm * self.thickness_mm * 1e-6
 
 
 @dataclass(frozen=True)
@@ -195,19 +190,14 @@ def read_curve(
     """
     recording = open_recording(path, layout)
     specimen = specimen.over(header_of(path))
-    choices = ("time",), ("strain", "travel", "true_strain"), ("stress", "force", "true_stress")
-    data, lost = read_columns(recording, given, *choices)
+    data, lost = read_columns(recording, given, ("time",), ("strain", "travel"), ("stress", "force"))
     strain, stress = data.get("strain"), data.get("stress")
-    if "true_strain" in data:
-        strain = np.expm1(data["true_strain"])
-    elif strain is None:
+    if strain is None:
         if specimen.gauge_mm is None:
             raise Refusal("--gauge-mm", None, f"{path.name} gives only the travel: the gauge length is required")
         strain = (data["travel"] - data["travel"][0]) * 1e3 / specimen.gauge_mm
         specimen = replace(specimen, crosshead=specimen.crosshead is not False)
-    if "true_stress" in data:
-        stress = data["true_stress"] / (1.0 + strain)
-    elif stress is None:
+    if stress is None:
         if specimen.area is None:
             raise Refusal("--width-mm", None, f"{path.name} gives only the force: width and thickness are required")
         stress = data["force"] / specimen.area
@@ -231,20 +221,16 @@ def read_curve(
 
 
 def header_of(path: Path) -> Specimen:
-    """Return specimen and machine from the lines "name;value" before the numbers."""
+    """Return the specimen from the lines "name;value" before the numbers."""
     found: dict[str, float | bool] = {}
     for name, value in _pairs(path):
         number = _NUMBER.match(value)
         for pattern, key in _HEADER:
-            if not number or not (match := re.search(pattern, name, re.IGNORECASE)):
+            if not number or not re.search(pattern, name, re.IGNORECASE):
                 continue
-            unit = match[1].lower() if match.groups() else ""
-            factor = {"cm": 10.0, "in": 25.4, "cm^2": 100.0, "cm2": 100.0}.get(unit, 1.0)
-            if key == "cell_n":
-                factor = _FORCES.get(number[2], 0.0)
             amount = float(number[1].replace(",", "."))
-            if factor and amount > 0 and not _MAYBE_THOUSANDS.fullmatch(number[1]):
-                found.setdefault(key, amount * factor)
+            if amount > 0 and not _MAYBE_THOUSANDS.fullmatch(number[1]):
+                found.setdefault(key, amount)
         if re.search("strain|elongation", name, re.IGNORECASE):
             if re.search("crosshead|cross-head|grip|traverse", value, re.IGNORECASE):
                 found["crosshead"] = True
@@ -256,18 +242,16 @@ def header_of(path: Path) -> Specimen:
 
 
 _HEADER = (
-    (r"thickness\s*[\[(](mm|cm|in)[\])]", "thickness_mm"),
-    (r"width\s*[\[(](mm|cm|in)[\])]", "width_mm"),
-    (r"(?:specimen|gauge|initial) length\s*[\[(](mm|cm|in)[\])]", "gauge_mm"),
-    (r"^\s*length\s*[\[(](mm|cm|in)[\])]", "length_mm"),
-    (r"(?:cross-?section|area)\s*[\[(](mm2|mm\^2|cm2|cm\^2)[\])]", "area_mm2"),
-    (r"load cell", "cell_n"),
+    (r"thickness\s*[\[(]mm[\])]", "thickness_mm"),
+    (r"width\s*[\[(]mm[\])]", "width_mm"),
+    (r"(?:specimen|gauge|initial) length\s*[\[(]mm[\])]", "gauge_mm"),
+    (r"^\s*length\s*[\[(]mm[\])]", "length_mm"),
 )
 
 
-_NUMBER = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:e-?\d+)?)\s*([a-zA-Z]*)")
+_NUMBER = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:e-?\d+)?)")
 _MAYBE_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
-_UNIT = re.compile(r"\s*[\[(]?(mm|cm|in|mm2|mm\^2|cm2|cm\^2|mm/min)[\])]?\s*")
+_UNIT = re.compile(r"\s*[\[(]?(mm)[\])]?\s*")
 
 
 def _pairs(path: Path) -> Iterator[tuple[str, str]]:
@@ -408,8 +392,8 @@ AREA_ERROR = 0.02
 """Relative error of a cross-section of which no lengths are known (assumed)."""
 MOST_SCATTER, OTHER_MATERIAL, MOST_OF_SHEET = 1.25, 3.0, 5.0
 """Largest over least specimen that is warned of, and that is no longer one silicone; modulus over the sheet's."""
-LEAST_OF_CELL, LATEST_START, MOST_BREAK, MOST_TOE = 1e-3, 0.02, 1.25, 0.02
-"""Limits: force over full scale, strain of the first point, break over the sheet's, strain of the toe."""
+LATEST_START, MOST_TOE = 0.02, 0.02
+"""Limits: strain of the first point, strain of the toe."""
 
 
 @dataclass(frozen=True)
@@ -455,7 +439,7 @@ class TensileResult:
 
 
 def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: Material | None = None) -> TensileResult:
-    """Evaluate the specimens of one material at a strain of use (low, high); `sheet` is compared with the break.
+    """Evaluate the specimens of one material at a strain of use (low, high); `sheet` is compared with it.
 
     Raises Refusal if no curve spans the strain of use, if a file is given twice, and for specimens that differ so
     much that they are not one silicone's.
@@ -491,7 +475,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     values = [row.value for row in rows if row.value is not None and row.defensible]
     warnings = []
     for curve, toe in zip(curves, toes, strict=True):
-        warnings += [Warned(code, f"{curve.name}: {message}") for code, message in _doubts(curve, used, toe, sheet)]
+        warnings += [Warned(code, f"{curve.name}: {message}") for code, message in _doubts(curve, toe)]
     if len(curves) == 1:
         warnings.append(Warned("specimens", "one curve: the scatter of specimens is not in the range"))
     if ratio > MOST_SCATTER:
@@ -539,16 +523,8 @@ def _area_error(specimen: Specimen) -> float:
     return math.hypot(CALLIPER_MM / specimen.width_mm, CALLIPER_MM / specimen.thickness_mm)
 
 
-def _doubts(
-    curve: TensileCurve, used: tuple[float, float], toe: Toe | None, sheet: Material | None
-) -> Iterator[tuple[str, str]]:
+def _doubts(curve: TensileCurve, toe: Toe | None) -> Iterator[tuple[str, str]]:
     """Yield the doubts about one curve: a word that names each, and a message."""
-    middle, specimen = sum(used) / 2.0, curve.specimen
-    if specimen.area and specimen.cell_n:
-        force = float(np.interp(middle, curve.strain, curve.stress)) * specimen.area
-        if force < LEAST_OF_CELL * specimen.cell_n:
-            below = f"below a thousandth of the cell's {specimen.cell_n:g} N"
-            yield "force", f"{force:.2g} N at {100 * middle:.3g} %, {below}: use a smaller cell"
     if curve.strain[0] > LATEST_START:
         yield "start", f"the first point is at {100 * curve.strain[0]:.3g} % strain"
     if toe and abs(toe.origin) > MOST_TOE:
@@ -557,12 +533,7 @@ def _doubts(
         yield "gaps", f"{curve.lost} rows lack a number and are skipped"
     if curve.skipped > 0.01 * len(curve.strain):
         yield "cycles", f"{curve.skipped} points skipped: the strain goes back, as in cycles; the first pull counts"
-    if sheet:
-        at, expected = 100 * curve.strain[-1], float(sheet.elongation_pct)
-        if not 1 / MOST_BREAK <= at / expected <= MOST_BREAK:
-            message = f"breaks at {at:.4g} %, {at / expected:.2g} times the sheet's {expected:g} %"
-            yield "break", f"{message}: the gauge length or the strain is doubtful"
-    if specimen.crosshead:
+    if curve.specimen.crosshead:
         yield "crosshead", "strain by the crosshead's travel: grips and shoulders count as gauge length"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -224,17 +223,7 @@ def material(
     gauge_mm: Annotated[
         float | None, typer.Option(help=f"Gauge length of the specimen. {_FROM_FILE}", **_LENGTH)
     ] = None,
-    cell_n: Annotated[
-        float | None,
-        typer.Option(metavar="N", min=0.001, callback=finite, help="Full scale of the force cell. Default: not known."),
-    ] = None,
-    strain: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Strain of use in %. Default: amplitude over walls.")
-    ] = "",
-    amplitude_um: Annotated[
-        float, typer.Option(metavar="UM", min=0.001, max=1e5, callback=finite, help="Amplitude of the motor.")
-    ] = 300.0,
-    wall_mm: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Walls that the motor strains, in mm.")] = "1.25:2.5",
+    strain: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Strain of use in %.")] = "12:24",
     frequency_hz: Annotated[
         float, typer.Option(metavar="HZ", min=1, max=5000, callback=finite, help="Frequency of the motor.")
     ] = 125.0,
@@ -260,8 +249,6 @@ def material(
         raise Refusal("FILES", None, "is required: a tensile curve or more, or --dma with a file")
     if deformation and dma is None:
         raise Refusal("--deformation", deformation, "says how --dma was measured, which is not given")
-    if cell_n is not None and not curves:
-        raise Refusal("--cell-n", cell_n, "belongs to tensile curves, of which none is given")
     for path in [*(curves or []), *([dma] if dma else [])]:
         if not path.exists():
             raise files.NotThere(path)
@@ -269,16 +256,13 @@ def material(
             expect_none_but("", read_toml(path), str(path), "FILE")
     given = parse_column(column or [])
     layout = Layout(_DELIMITERS.get(delimiter, delimiter), decimal, skip_lines)
-    used = _strain(strain, amplitude_um, wall_mm)
+    used = _strain(strain)
     with progress("material") as stage:
-        specimen = Specimen(width_mm, thickness_mm, gauge_mm, cell_n=cell_n)
+        specimen = Specimen(width_mm, thickness_mm, gauge_mm)
         read = []
         for path in curves or []:
             stage(path.name)
             read.append(read_curve(path, given, specimen, layout))
-            if cell_n is not None and read[-1].specimen.area is None:
-                limit = f"needs the cross-section, which {path.name} does not give: --width-mm and --thickness-mm"
-                raise Refusal("--cell-n", cell_n, limit)
         moduli = None
         if dma is not None:
             stage(dma.name)
@@ -344,27 +328,14 @@ def _slug(path: Path) -> str:
     return "-".join(words) or "material"
 
 
-def _strain(strain: str, amplitude_um: float, wall_mm: str) -> tuple[float, float]:
-    """Return the strain of use as fractions: as given in %, or the motor's amplitude over the walls."""
-    if strain:
-        low, high = _pair("--strain", strain, "12:24")
-        used = low / 100, high / 100
-    else:
-        thin, thick = _pair("--wall-mm", wall_mm, "1.25:2.5")
-        used = amplitude_um / 1e3 / thick, amplitude_um / 1e3 / thin
-    if not 0.001 <= used[0] < used[1] <= 1.0:
-        shown = f"{100 * used[0]:.4g}:{100 * used[1]:.4g}"
-        raise Refusal("--strain", shown, "must rise, from 0.1 % or more to 100 % or less", "12:24")
-    return used
-
-
-def _pair(field: str, text: str, nearest: str) -> tuple[float, float]:
+def _strain(text: str) -> tuple[float, float]:
+    """Return the strain of use as fractions, as given in %."""
     try:
-        low, high = (float(part) for part in text.split(":"))
+        low, high = (float(part) / 100 for part in text.split(":"))
     except ValueError:
-        raise Refusal(field, text, "needs two numbers LOW:HIGH", nearest) from None
-    if not (math.isfinite(low) and math.isfinite(high) and 0 < low < high):
-        raise Refusal(field, text, "needs LOW above 0 and below HIGH", nearest)
+        raise Refusal("--strain", text, "needs two numbers LOW:HIGH", "12:24") from None
+    if not 0.001 <= low < high <= 1.0:
+        raise Refusal("--strain", text, "must rise, from 0.1 % or more to 100 % or less", "12:24")
     return low, high
 
 

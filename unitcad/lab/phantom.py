@@ -60,11 +60,10 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         tuple[Annotated[float, between(0, 60)], ...],
         Meta(min_length=2, max_length=13, description="distances of the measuring points from the unit's edge"),
     ] = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-    inside_mm: Annotated[
-        Annotated[float, between(40, 400)] | None,
-        Meta(description="inner side of the box; default: the smallest with an echo below most_echo_pct"),
-    ] = None
-    most_echo_pct: Annotated[float, between(0.5, 50, "largest echo of the walls at the last point, in percent")] = 5.0
+    most_echo_pct: Annotated[
+        float,
+        between(0.5, 50, "largest echo of the walls at the last point, percent"),
+    ] = 5.0
     plate_thickness_mm: Annotated[float, between(2, 20, "thickness of the acrylic plate below")] = 5.0
     printer: Annotated[str, Meta(description="printer of the catalogue")] = "fdm-0.4"
     waste: Annotated[float, between(0, 2, "extra mix, as a fraction")] = 0.1
@@ -457,28 +456,17 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     if math.isinf(wall):
         limit = f"no wall is far enough for an echo below {table.most_echo_pct:g} % {farthest}"
         raise Refusal("most_echo_pct", table.most_echo_pct, limit)
-    needed = _STEP_MM * math.ceil(2 * wall / _STEP_MM)
-    inside = table.inside_mm or needed
-    if inside < 2 * wall:
-        limit = (
-            f"the walls' echo is {echo_pct(table, recipes, inside / 2):.3g} % {farthest}; for "
-            f"{table.most_echo_pct:g} % they must be {wall:g} mm from the unit's centre"
-        )
-        raise Refusal("inside_mm", inside, limit, needed)
+    inside = _STEP_MM * math.ceil(2 * wall / _STEP_MM)
     size = lengths(table, inside, printer)
     tools = tuple(pieces(table, size))
     for piece in printed_pieces(tools):
         lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
         needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)
-        over = float(np.max(np.subtract(needed_mm, bed)[:2]))
         if np.all(np.less_equal(needed_mm, bed)):
             continue
         short, long, high = needed_mm
         fitting = (name for name, one in printers().items() if np.all(np.less_equal(needed_mm, _bed(one))))
         limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {high:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
-        if over > 0 and inside - over > 40:
-            echo = echo_pct(table, recipes, (inside - over) / 2)
-            limit += f"; about {inside - over:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
         raise Refusal("printer", printer.name, limit, next(fitting, None))
     layers = tuple(cast(table, size))
     volumes = tuple(float(realise(body.shape, SEGMENTS).volume()) for body in layers)

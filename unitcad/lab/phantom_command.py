@@ -10,7 +10,6 @@ from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from unitcad import files
@@ -18,13 +17,12 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import Item, to_csv
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
 from unitcad.catalogue import printers
-from unitcad.cli.output import print_indented, print_json, print_table, progress, warn
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.export import printing, svg
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready
-from unitcad.export.raster import Surface, draw
-from unitcad.kernels.mesh import arrays, bounds, realise
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.lab.phantom import (
     SEGMENTS,
     THINNER_MM,
@@ -36,7 +34,6 @@ from unitcad.lab.phantom import (
     tissue_table,
 )
 from unitcad.meshcheck import Options, check_file
-from unitcad.shape.tree import Body
 from unitcad.text import markdown, toml, toml_key
 
 NEAR_LAYER = 0.02
@@ -354,8 +351,6 @@ def _expectations(phantom: PhantomSet) -> Iterator[str]:
     )
 
 
-APART_MM = 14.0
-"""Between two pieces of the box taken apart."""
 FINISHED = "casting.md"
 """The file that is put in place last: a folder that has it is whole."""
 
@@ -387,25 +382,6 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
         FINISHED: casting_markdown(phantom),
     }
     return {**found, **{name: text.encode() for name, text in texts.items()}}
-
-
-def box_picture(phantom: PhantomSet) -> bytes:
-    """Draw the box taken apart as a PNG file."""
-    shown = [body for body in phantom.tools if body.kind != "blade"]
-
-    def place(body: Body) -> tuple[float, bool]:
-        """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
-        _, _, low, _, _, high = bounds(realise(body.shape, SEGMENTS))
-        return (low if body.kind == "base" else high, body.kind == "layer")
-
-    bodies = sorted([*shown, *phantom.layers], key=place)
-    parts, height = [], 0.0
-    for body in bodies:
-        vertices, faces = arrays(realise(body.shape, SEGMENTS))
-        low, high = vertices[:, 2].min(), vertices[:, 2].max()
-        parts.append(Surface(vertices + np.array([0.0, 0.0, height - low]), faces, body.colour, body.name))
-        height += (high - low) + APART_MM
-    return draw(parts, (1.0, -2.0, 0.7), (1200, 900))
 
 
 def tissue_toml(phantom: PhantomSet) -> str:
@@ -479,7 +455,6 @@ def phantom(
         str, typer.Argument(metavar="[PHANTOM]", help="Phantom file, or name of a shipped one (unitcad list phantoms).")
     ] = "skin",
     out: Out = Path("out"),
-    png: Annotated[bool, typer.Option("--png", help="Also draw the box taken apart, box.png.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a skin phantom to cast, and its response.
@@ -493,9 +468,6 @@ def phantom(
         stage("response")
         made = phantom_set(table)
         found = contents(made, stage)
-        if png:
-            stage("picture")
-            found["box.png"] = box_picture(made)
         stage("checks")
         folder = out / f"phantom-{table.name}"
         faults = write(folder, found, made.printer.name)
@@ -509,38 +481,10 @@ def phantom(
             }
         )
     else:
-        _print(made)
+        off = f"{made.expected.factor:.2g}"
+        typer.echo(f"repeatable, not skin-like: its response is off the forearm template by a factor of {off}")
         typer.echo(str(folder))
     for fault in faults:
         warn(f"finding: {fault}")
     if faults:
         raise typer.Exit(1)
-
-
-def _print(made: PhantomSet) -> None:
-
-    e = made.expected
-    print_table(
-        [
-            {
-                "layer": layer.name,
-                "silicone": one.silicone.name,
-                "thinner": f"{one.thinner_pct:g} %",
-                "kPa": f"{one.modulus_kpa:.3g}",
-                "mm": f"{layer.thickness_mm:g}",
-                "0.1 mm thinner": f"{100 * e.sensitivity[layer.name]:+.2g} %",
-            }
-            for layer, one in zip(made.table.layers, made.recipes, strict=True)
-        ]
-    )
-    curves = {"expected": e.value, "forearm": e.forearm}
-    at = [f"{distance:g}" for distance in e.distances_mm]
-    print_table(
-        [{"mm": name, **dict(zip(at, (f"{v:.3f}" for v in curve), strict=True))} for name, curve in curves.items()]
-    )
-    print_indented(
-        f"inside {made.inside_mm:g} mm: an echo of {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm; "
-        f"{made.table.most_echo_pct:g} % "
-        f"need walls {e.wall_mm:g} mm from the unit's centre",
-        f"repeatable, not skin-like: off the forearm template by a factor of {e.factor:.2g}",
-    )

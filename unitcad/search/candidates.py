@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -28,7 +27,7 @@ from unitcad.designs.dimensions import MOTOR_CLEARANCE
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import drawn_input, silicone_layer
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.search.target_file import MOST_GEOMETRIES, MOST_PITCH_MM, Target
+from unitcad.search.target_file import MOST_GEOMETRIES, Target
 from unitcad.spec import Spec
 from unitcad.text import join_words, number, some
 from unitcad.validation import from_data
@@ -312,8 +311,9 @@ def tabulate(
 def probability(target: Target, predictive: Predictive) -> np.ndarray:
     """Return the probability of meeting the level, shape (...)."""
     goals = target.goals
-    below = predictive.at_most(goals.edge_max) if goals.edge_max is not None else np.ones(predictive.centre.shape)
-    return below - predictive.at_most(goals.edge_min) if goals.edge_min is not None else below
+    if goals.edge_max is not None:
+        return predictive.at_most(goals.edge_max)
+    return 1.0 - predictive.at_most(goals.edge_min or 0.0)
 
 
 def _units(
@@ -388,10 +388,6 @@ def _crosstalk(target: Target, made: Sequence[Geometry]) -> np.ndarray:
     return ratios
 
 
-_PITCHES = np.unique(np.round([*np.arange(1.0, 100.0, 0.1), *np.arange(100.0, MOST_PITCH_MM + 1.0)], 1))
-"""Pitches that are offered, mm: those of three digits."""
-
-
 @dataclass(frozen=True)
 class Limit:
     """A limit: the target's key and value, the limited quantity, the unit, each row's value, and who meets it.
@@ -453,37 +449,24 @@ def within(found: Candidates) -> np.ndarray:
     return np.flatnonzero(met.all(axis=0))
 
 
-def _level_limits(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) -> list[Limit]:
-    """Return the limits on the level.
+def meets_level(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) -> np.ndarray:
+    """Return whether each row meets the level: by its measurement, or with the probability that is asked for."""
+    met = found.probability >= found.target.goals.probability_min
+    met[list(measured)] = [one["meets"] for one in measured.values()]
+    return met
 
-    A row's value is the level that it meets with the probability that is asked for, or its measured level if that is
-    nearer.
+
+def _level_limit(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) -> Limit:
+    """Return the limit on the level.
+
+    A row's value is its measured level, or the one that it meets with the probability that is asked for.
     """
     goals, share = found.target.goals, found.target.goals.probability_min
-    own = np.full(found.count, np.nan)
-    own[list(measured)] = [one["level"] for one in measured.values()]
-    met = found.probability >= share
-    met[[row for row, one in measured.items() if one["meets"]]] = True
-    what, unit, least, most = (
-        "an edge level of",
-        f" (probability {share:g}, or measured)",
-        goals.edge_min,
-        goals.edge_max,
-    )
-    if least is None:
-        values = np.fmin(found.predictive.quantile(share), own)
-        return [Limit("edge_max", what, unit, most or np.inf, values, met)]
-    if most is None:
-        values = np.fmax(found.predictive.quantile(1 - share), own)
-        return [Limit("edge_min", what, unit, least, values, met, is_least=True)]
-    low, high = (found.predictive.quantile(end) for end in ((1 - share) / 2, (1 + share) / 2))
-    nearer = np.maximum(own, most) / np.minimum(own, least) < np.maximum(high, most) / np.minimum(low, least)
-    low, high = (np.where(nearer, own, end) for end in (low, high))
-    met_low = met | (low >= least)
-    return [
-        Limit("edge_min", what, unit, least, low, met_low, is_least=True),
-        Limit("edge_max", what, unit, most, high, met | ((high <= most) & ~met_low)),
-    ]
+    is_least = goals.edge_max is None
+    values = found.predictive.quantile(1 - share if is_least else share)
+    values[list(measured)] = [one["level"] for one in measured.values()]
+    key, asked = ("edge_min", goals.edge_min) if is_least else ("edge_max", goals.edge_max)
+    return Limit(key, "level at the edge", "", asked or 0.0, values, meets_level(found, measured), is_least)
 
 
 def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) -> None:
@@ -491,29 +474,14 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
 
     measured: see `measured_rows`. If several values must change, the refusal has the others in its `others`.
     """
-    asked = [*limits(found), *_level_limits(found, measured)]
+    asked = [*limits(found), _level_limit(found, measured)]
     far, missed = np.array([limit.far for limit in asked]), ~np.array([limit.met for limit in asked])
     if not missed.any(axis=0).all():
         return
-    rest = " and the rest" if len(asked) > 1 else ""
-    none = f"none of {found.count} candidates meets it{rest}"
-    alone = missed & (missed.sum(axis=0) == 1) & np.isfinite(far)
-    if alone.any():
-        each = [(limit, _nearest(found, far[i], alone[i])) for i, limit in enumerate(asked) if alone[i].any()]
-        (limit, row), *others = sorted(each, key=lambda one: float(one[0].far[one[1]]))
-        value = limit.offer(row)
-        end = "most" if limit.is_least else "least"
-        words = f"{none}; {limit.what} {value:g}{limit.unit} is the {end} ({label(found, row)})"
-        for other, at in others:
-            words += f"; or target.{other.key} = {other.offer(at):g} in its place ({label(found, at)})"
-        pitch = _pitch(found, row) if limit.key == "crosstalk_ratio_max" else None
-        words += f"; or target.pitch_mm = {pitch:g} in its place" if pitch else ""
-        raise Refusal(f"target.{limit.key}", limit.asked, words + _left_out(found), value)
-    row = _nearest(found, far.sum(axis=0), np.ones(found.count, dtype=bool))
+    rows = np.arange(found.count)  # of equally near ones, the one with the fewest unmeasured inputs
+    row = int(np.lexsort((rows, found.novelty, np.round(far.sum(axis=0), 9)))[0])
+    none = f"none of {found.count} candidates meets it" + (" and the rest" if len(asked) > 1 else "")
     offers = {limit.key: (limit.asked, limit.offer(row)) for i, limit in enumerate(asked) if missed[i, row]}
-    if "pitch_mm" in offers and (pitch := _pitch(found, row)):
-        offers.pop("crosstalk_ratio_max", None)
-        offers["pitch_mm"] = offers["pitch_mm"][0], pitch
     made = []
     for key, (value, offer) in offers.items():
         others = [f"target.{other} = {instead:g}" for other, (_, instead) in offers.items() if other != key]
@@ -522,24 +490,6 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
         made.append(Refusal(f"target.{key}", value, words, offer))
     made[0].others = tuple(made[1:])
     raise made[0]
-
-
-def _nearest(found: Candidates, far: np.ndarray, among: np.ndarray) -> int:
-    """Return the nearest row; of equals the one with the fewest unmeasured inputs."""
-    rows = np.flatnonzero(among)
-    return int(rows[np.lexsort((rows, found.novelty[rows], np.round(far[rows], 9)))[0]])
-
-
-def _pitch(found: Candidates, row: int) -> float | None:
-    """Return the least pitch at which a row's crosstalk ratio is within its limit, mm; None if there is none."""
-    geometry, most = found.geometries[found.geometry[row]], found.target.goals.crosstalk_ratio_max
-    pitches = _PITCHES[geometry.lengths.diameter - 1e-9 <= _PITCHES].tolist()
-
-    def is_met(pitch: float) -> bool:
-        return most is None or crosstalk_ratio(geometry.variant, 1e-3 * pitch, spread=False).middle <= most
-
-    at = bisect_left(pitches, True, key=is_met)
-    return pitches[at] if at < len(pitches) else None
 
 
 def label(found: Candidates, row: int) -> str:

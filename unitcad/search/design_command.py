@@ -46,9 +46,7 @@ def design(
     bold(f"{data['name']}: {design_files.target_line(data['target'])}")
     for line in design_files.head_lines(data):
         plain(f"  {line}")
-    for i, one in enumerate(data["proposals"]):
-        if design_files.is_first_other(data["proposals"], i):
-            plain(f"{design_files.OTHERS}:")
+    for one in data["proposals"]:
         bold(design_files.title(one))
         plain(f"   {design_files.level_line(one)}")
         for line in design_files.lines(one):

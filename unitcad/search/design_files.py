@@ -24,8 +24,6 @@ from unitcad.search.proposals import Inversion, name_of, order_rows
 from unitcad.spec import to_toml
 from unitcad.text import cell, join_words, number
 
-OTHERS = "Next candidates: measured outside the target, or below the required probability"
-"""The heading over the candidates that are no proposals."""
 _GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
     "edge_max": "at most {} of the motor's amplitude at the edge",
@@ -78,18 +76,12 @@ def title(one: Mapping[str, Any]) -> str:
     return f"{one['rank']}. {one['label']}" + ("" if one["lengths_measured"] else " (not measured at these lengths)")
 
 
-def is_first_other(proposals: Sequence[Mapping[str, Any]], i: int) -> bool:
-    """Tell whether a candidate is under the heading `OTHERS`."""
-    return proposals[i]["nearest_other"] and not any(one["nearest_other"] for one in proposals[:i])
-
-
 def level_line(one: Mapping[str, Any]) -> str:
     """Return a proposal's measurement, if there is one, then its probability and range."""
     first = f"{measured_words(one['measured'])}; " if one["measured"] else ""
-    edge, least = one["edge"], one["probability_min"]
-    below = f", below your {100 * least:.3g} %" if one["probability"] < least else ""
+    edge = one["edge"]
     return (
-        f"{first}probability {one['probability']:.2f}{below}, {percent(edge['p10'])} to {percent(edge['p90'])} "
+        f"{first}probability {one['probability']:.2f}, {percent(edge['p10'])} to {percent(edge['p90'])} "
         "at the edge (10 to 90 %)"
     )
 
@@ -235,19 +227,16 @@ def html_page(data: Mapping[str, Any], sections: Sequence[str]) -> str:
 
 def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
     rows, head = [], ("unit", "measured", "probability", "10 to 90 %", "g", "hours", "mm")
-    for i, one in enumerate(proposals):
+    for one in proposals:
         edge, measured = one["edge"], one["measured"]
-        outside = "" if not measured or measured["meets"] else ", outside"
         cells = [
-            percent(measured["level"]) + outside if measured else "",
+            percent(measured["level"]) if measured else "",
             f"{one['probability']:.2f}",
             f"{percent(edge['p10'])} to {percent(edge['p90'])}",
             number(one["mass_g"], 2),
             number(one["cure_hours"], 3),
             f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",
         ]
-        if is_first_other(proposals, i):
-            rows.append(f'<tr><td colspan="{len(head)}">{escape(OTHERS)}</td></tr>')
         numbers = "".join(
             f'<td{_NUMBER} data-head="{escape(name)}">{escape(text)}</td>'
             for name, text in zip(head[1:], cells, strict=True)

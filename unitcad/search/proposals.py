@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,8 +15,6 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.measured import measured_block, nearest
 from unitcad.attenuation.edge.ranges import lead_of, own_block
 from unitcad.attenuation.inputs import EstimateInput
-from unitcad.casting.figures import MOST_ERROR_PCT, mix
-from unitcad.catalogue import materials as silicones
 from unitcad.catalogue import measurements
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
@@ -30,11 +28,12 @@ from unitcad.search.candidates import (
     check_possible,
     label,
     limits,
+    meets_level,
     within,
 )
 from unitcad.search.target_file import Target
 from unitcad.spec import Spec
-from unitcad.text import join_words, number
+from unitcad.text import number
 from unitcad.validation import warnings
 
 EQUAL = 0.1
@@ -124,8 +123,6 @@ def measured_rows(found: Candidates) -> dict[int, dict[str, Any]]:
 
 
 SHOWN = 5
-_LEAST_SHOWN = 0.005
-"""A kind with a smaller probability, 0.00 with two digits, is no proposal."""
 _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
 RANKS = "design and which side is soft"
@@ -158,7 +155,9 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     found = candidates(target, say)
     rows, measured = within(found), measured_rows(found)
     check_possible(found, measured)
-    chosen, out = _choose(found, _rank(found, rows, measured), check, say)
+    ranked = kinds(found, rows[meets_level(found, measured)[rows]])
+    ranked.sort(key=lambda kind: kind.best not in measured)
+    chosen, out = _choose(found, ranked, check, say)
     if not chosen:
         limit = f"none of the best can be cast: {out[0]['candidate']}: {out[0]['failed'][0]}"
         raise Refusal("at_hand.printer", target.asked.at_hand.printer, limit)
@@ -166,7 +165,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     proposals = [{**one, "rank": i} for i, (_, one) in enumerate(chosen, 1)]
     for one in proposals:
         first = next(other for other in proposals if other["group"] == one["group"])
-        one["equal_to"] = None if first is one or one["nearest_other"] else first["rank"]
+        one["equal_to"] = None if first is one else first["rank"]
     data = {
         "name": target.name,
         "target": {key: value for key, value in _goals(target).items() if value is not None},
@@ -201,7 +200,7 @@ def _choose(
     chosen: list[tuple[Spec, dict[str, Any]]] = []
     out: list[dict[str, Any]] = []
     for kind in ranked:
-        if len(chosen) == SHOWN or (chosen and kind.most < _LEAST_SHOWN):
+        if len(chosen) == SHOWN:
             break
         say(f"{len(chosen) + 1} of {SHOWN}: {label(found, kind.best)}")
         for row in map(int, kind.rows[:_TRIES]):
@@ -226,33 +225,6 @@ def castability(spec: Spec) -> tuple[int, list[str]]:
     ]
 
 
-def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any] | None) -> bool:
-    """Tell whether a candidate is no proposal but one of the nearest others.
-
-    It was measured outside the target, or is less probable than is asked for and was not measured within it.
-    """
-    return not measured["meets"] if measured else probability < found.target.goals.probability_min
-
-
-def _rank(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
-    """Return the kinds in their order, those measured within the target first, the nearest others last.
-
-    A measured unit within the target represents its kind if the kind's best is less probable than required.
-    """
-    made = []
-    for kind in kinds(found, rows):
-        inside = [int(row) for row in kind.rows if measured.get(int(row), {}).get("meets")]
-        if inside and found.probability[kind.best] < found.target.goals.probability_min:
-            kind = replace(kind, rows=np.array([*inside, *(row for row in kind.rows if row not in inside)]))
-        made.append(kind)
-
-    def group(kind: Kind) -> int:
-        own = measured.get(kind.best)
-        return 2 if _is_other(found, float(found.probability[kind.best]), own) else 0 if own else 1
-
-    return sorted(made, key=group)
-
-
 def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None) -> dict[str, Any]:
     """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
     variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
@@ -267,8 +239,6 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "caps_mm": list(lengths.caps),
         "motor": lengths.motor,
         "measured": measured,
-        "nearest_other": _is_other(found, float(found.probability[row]), measured),
-        "probability_min": goals.probability_min,
         "probability": float(found.probability[row]),
         "group": kind.group,
         "edge": {"p10": low, "p50": middle, "p90": high},
@@ -281,7 +251,7 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "lengths_measured": not found.novelty[row],
         "relies_on": nearest(variant)["differs_in"],
         "lengths_gain": _gain(kind),
-        "remarks": [*warnings(spec), *_scale(spec)],
+        "remarks": warnings(spec),
     }
     if goals.pitch_mm is not None:
         ratio = crosstalk_ratio(variant, 1e-3 * goals.pitch_mm)
@@ -338,20 +308,8 @@ def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
 def _gain(kind: Kind) -> str:
     """Say how lengths change a kind's probability."""
     if kind.rows.size < 2:
-        return "its lengths are the only ones within the limits"
+        return "no other lengths meet the target"
     return (
-        f"{kind.rows.size} sets of lengths are within the limits: the evidence does not rank them; the farther from "
+        f"{kind.rows.size} sets of lengths meet the target: the evidence does not rank them; the farther from "
         f"the measured ones, the wider the range (probability {kind.least:.2f} to {kind.most:.2f})"
     )
-
-
-def _scale(spec: Spec) -> list[str]:
-    """Say if the scale is too coarse for the smaller part of a pour's mix."""
-    known, names = silicones(spec.materials), dict.fromkeys(layer.material for layer in spec.layers)
-    poor = [name for name in names if mix(spec, known[name], 1.0).mix_error_pct > MOST_ERROR_PCT]
-    if not poor:
-        return []
-    digit, least = number(spec.casting.scale_resolution_g, 3), number(spec.casting.minimum_mix_g, 3)
-    return [
-        f"a scale of {digit} g is off by more than {MOST_ERROR_PCT:g} % on a part of {least} g of {join_words(poor)}"
-    ]

@@ -240,10 +240,8 @@ def _check_percent(data: Mapping[str, Any]) -> None:
 def _check_target(goals: TargetTable) -> None:
     if goals.edge_max is None and goals.edge_min is None:
         raise Refusal("target.edge_max", None, "is required, or edge_min for a unit that amplifies")
-    if goals.edge_max is not None and goals.edge_min is not None and goals.edge_min >= goals.edge_max:
-        raise Refusal(
-            "target.edge_min", goals.edge_min, f"must be below edge_max, {goals.edge_max:g}", goals.edge_max / 2
-        )
+    if goals.edge_max is not None and goals.edge_min is not None:
+        raise Refusal("target.edge_min", goals.edge_min, "excludes edge_max: a target has one of the two")
     if goals.crosstalk_ratio_max is not None and goals.pitch_mm is None:
         raise Refusal("target.pitch_mm", None, "is required with crosstalk_ratio_max")
 

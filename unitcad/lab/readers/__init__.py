@@ -86,9 +86,7 @@ _STRAIN = {"1": 1.0, "%": 1e-2, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "-": 1.0
 COLUMN_UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
     "strain": _STRAIN,
-    "true_strain": _STRAIN,
     "stress": _PRESSURE,
-    "true_stress": _PRESSURE,
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": 4.4482216152605, "gf": 9.80665e-3, "kgf": 9.80665},
     "travel": {"mm": 1e-3, "um": 1e-6, "cm": 1e-2, "m": 1.0, "in": 0.0254},
     "frequency": {"Hz": 1.0, "rad/s": 1.0 / (2.0 * np.pi)},

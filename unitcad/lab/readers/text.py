@@ -23,8 +23,6 @@ HEAD = 1_000_000
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[nN][aA][nN]", re.ASCII)
 _OVER_RANGE = re.compile(r"[+-]?(?:∞|inf(?:inity)?|f{4,}|-{3,}|\*{3,}|#{3,})", re.ASCII | re.IGNORECASE)
 """Signs for a value beyond the range: of PicoScope, Keyence, and spreadsheets."""
-_CLOCK = re.compile(r"(?:\d[\d/.-]*[ T])?(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)", re.ASCII)
-"""A time of day, perhaps after a date."""
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?(?:[eE][+-]?\d+)?", re.ASCII)
 _DIALECTS = (("\t", "."), (";", "."), (",", "."), (" ", "."), ("\t", ","), (";", ","), (" ", ","), (",", ","))
 """Delimiter and decimal sign; the same sign for both only if quotes separate them."""
@@ -82,19 +80,17 @@ _SWAPPED = str.maketrans(",.", ".,")
 
 
 def _is_number(field: str) -> bool:
-    return any(kind.fullmatch(field) for kind in (_NUMBER, _OVER_RANGE, _CLOCK))
+    return any(kind.fullmatch(field) for kind in (_NUMBER, _OVER_RANGE))
 
 
 def _value(field: str) -> float:
     """Return the number in a field; NaN for an empty one and for the sign of a value beyond the range."""
-    if clock := _CLOCK.fullmatch(field):
-        return 3600 * float(clock[1]) + 60 * float(clock[2]) + float(clock[3])
     return float(field) if _NUMBER.fullmatch(field) else np.nan
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the columns of a text file. Raises Unreadable if it has no block of numbers, or an ambiguous one."""
-    lines = _beside(_text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n"))
+    lines = _text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     sizes = np.cumsum([len(line) + 1 for line in lines])
     head = lines[: max(int(np.searchsorted(sizes, HEAD)), 1)] if sizes[-1] > HEAD else lines
     block = _block(path, head, layout)
@@ -106,11 +102,8 @@ def read(path: Path, layout: Layout) -> list[Channel]:
             raise Unreadable("skip_lines", None, f"{limit}{block.start + 1}; correct the file, or skip that line")
     rows = _rows(path, lines, block)
     names, units, step = _header(lines[layout.skip_lines : block.start] or lines[: block.start], block)
-    clocks = [bool(_CLOCK.fullmatch(field)) for field in block.row(lines[block.start], block.width)[0]]
     shown = [i for i, kind in enumerate(block.kinds) if kind == "n"]
-    if step is not None and names[0] == "X":  # a counter of the samples
-        shown = shown[1:]
-    return [Channel(rows[:, i], names[i] or f"column {i + 1}", "s" if clocks[i] else units[i], step) for i in shown]
+    return [Channel(rows[:, i], names[i] or f"column {i + 1}", units[i], step) for i in shown]
 
 
 def _text(path: Path) -> str:
@@ -130,18 +123,6 @@ def _text(path: Path) -> str:
         except UnicodeDecodeError:
             continue
     return content.decode("latin-1")
-
-
-def _beside(lines: list[str]) -> list[str]:
-    """Return the lines of an oscilloscope that writes its header next to the data (Tektronix) with the header above."""
-    if not re.match(r'"?Record Length"?,', lines[0]):
-        return lines
-    rows = [[cell.strip(' "') for cell in line.split(",")] for line in lines if line.strip(" ,")]
-    starts = range(0, len(rows[0]) - 4, 6)
-    said = [{row[k]: row[k + 1] for row in rows if len(row) > k + 1} for k in starts]
-    names = [f"{one.get('Source', f'CH{i}')} ({one.get('Vertical Units', '')})" for i, one in enumerate(said, 1)]
-    head = ",".join([f"Time ({said[0].get('Horizontal Units', '')})", *names])
-    return [head, *(",".join([row[3], *(row[k + 4] for k in starts)]) for row in rows if len(row) > starts[-1] + 4)]
 
 
 def _quoted(line: str, delimiter: str, strict: bool = True) -> list[str]:
@@ -236,30 +217,25 @@ def _rows(path: Path, lines: list[str], block: Block) -> Floats:
 def _header(header: list[str], block: Block) -> tuple[list[str], list[str], float | None]:
     """Return the columns' names and units by the last lines of the header, and the step that it may state, in s."""
     rows = [_words(line, block.delimiter) for line in header if line.strip()]
-    names, units, step = [""] * block.width, [""] * block.width, None
+    names, units = [""] * block.width, [""] * block.width
     if any(row[:1] == [_END_OF_HEADER] for row in rows):
         return _lvm_header(rows, block.width)
-    rows = rows[-2:]
-    if len(rows) == 2 and rows[0][:1] == ["X"] and rows[1][:1] == ["Sequence"] and "Increment" in rows[0][1:]:
-        # An oscilloscope whose first column is an index (Rigol).
-        value = (rows[1] + [""] * len(rows[0]))[rows[0].index("Increment")]
-        step = float(value) if _NUMBER.fullmatch(value) and float(value) > 0 else None
-    if step is None:  # a line of more names than columns says not which column each one names
-        rows = [row for row in rows if len(row) == block.width]
+    # A line of more names than columns says not which column each one names.
+    rows = [row for row in rows[-2:] if len(row) == block.width]
     if not rows:
         return names, units, None
-    last = rows[-1][: block.width]
+    last = rows[-1]
     alone = [bool(_UNIT_ALONE.fullmatch(word)) for word in last]
     units_row = any(last) and all(is_known_unit(word) or a for word, a in zip(last, alone, strict=True) if word)
-    if step is not None or units_row or all(alone):
-        names = rows[0][: block.width] if len(rows) == 2 else [word.strip("[]() ") for word in last]
+    if units_row or all(alone):
+        names = rows[0] if len(rows) == 2 else [word.strip("[]() ") for word in last]
         names = [""] * block.width if len(rows) == 1 and all(alone) else names
         units = [word.strip("[]() ") if is_known_unit(word) or a else "" for word, a in zip(last, alone, strict=True)]
     elif not any(alone):  # a unit by itself among names: its spaces have split them
         for i, word in enumerate(last):
             parts = _NAMED_UNIT.fullmatch(word)
             names[i], units[i] = (parts[1] or word, parts[2]) if parts else (word, "")
-    return names, units, step
+    return names, units, None
 
 
 def _lvm_header(rows: list[list[str]], width: int) -> tuple[list[str], list[str], float | None]:
