@@ -97,8 +97,8 @@ class CheckedMesh:
     inspection: Inspection | None = None
 
 
-def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict: bool = False) -> CheckedMesh:
-    """Apply the rules that need no printer; `cross` and `strict` are those of `Inspection`."""
+def check_surface(mesh: Mesh, deadline: Deadline, *, strict: bool = False) -> CheckedMesh:
+    """Apply the rules that need no printer; `strict` is that of `Inspection`."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
     points = representable(mesh.vertices)
     # What was made 0 may be where another vertex is.
@@ -111,7 +111,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, cross, strict=strict)
+        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, strict=strict)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
@@ -295,14 +295,13 @@ def _geometry(
         bbox_mm=(point(corners[:, 0].min(axis=0)), point(corners[:, 1].max(axis=0))),
         watertight=all(facts.watertight for facts, _ in each),
     )
-    if options.cross:
-        solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
-        sound = (
-            Solid(instance.mesh(placed=True), volume, str(instance.object.id))
-            for instance, volume in compress(zip(instances, volumes, strict=True), solids)
-        )
-        with keeping(change=_filled):
-            findings += _filled(overlapping(sound, "instances", deadline))
+    solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
+    sound = (
+        Solid(instance.mesh(placed=True), volume, str(instance.object.id))
+        for instance, volume in compress(zip(instances, volumes, strict=True), solids)
+    )
+    with keeping(change=_filled):
+        findings += _filled(overlapping(sound, "instances", deadline))
     findings += s_scale.likely_unit(whole, build.unit)
     findings += g_shells.expected(whole.shells, options.shells)
     if options.printer is not None:
@@ -317,7 +316,7 @@ def _check_object(instance: Instance, options: Options, deadline: Deadline) -> C
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     judged = partial(_filled, strict=options.strict_3mf)
     with keeping(change=judged):
-        checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+        checked = check_surface(mesh, deadline, strict=options.strict)
     return replace(checked, findings=tuple(judged(checked.findings)))
 
 
@@ -395,8 +394,7 @@ def _by_mesh(step: Measured, options: Options, deadline: Deadline) -> Iterator[F
     if opened:
         text = f"{counted(opened, 'solid')} without a closed mesh; overlap (G002) and printability (D) are not judged"
         yield F012.finding(f"OCCT makes {text}", opened, severity="warning")
-    if options.cross:
-        yield from overlapping(solids, "solids", deadline, thick=2 * step.tolerance)
+    yield from overlapping(solids, "solids", deadline, thick=2 * step.tolerance)
     if options.printer is not None and step.meshes:
         whole = _mesh(step.meshes)
         part = Inspection(whole, topology_of(whole, deadline.tick), deadline.tick)

@@ -159,7 +159,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     if factor != 1.0:
         mesh = replace(mesh, vertices=mesh.vertices * factor)
     with keeping(findings):
-        whole = check_assembly(mesh, deadline, strict=options.strict) if kind == "glb" and options.cross else None
+        whole = check_assembly(mesh, deadline, strict=options.strict) if kind == "glb" else None
         more, facts = _check_surface(mesh, options, deadline, whole)
     return findings + more, facts
 
@@ -183,7 +183,7 @@ def _check_surface(
     mesh: Mesh, options: Options, deadline: Deadline, checked: CheckedMesh | None = None
 ) -> tuple[list[Finding], Facts]:
     """Check the mesh of a file that has no instances; `checked`: its surface, if that is done."""
-    checked = checked or check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+    checked = checked or check_surface(mesh, deadline, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
         with keeping(findings, facts):
