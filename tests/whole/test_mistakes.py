@@ -59,7 +59,6 @@ COMMANDS = {
     "batch a b": "SWEEP = 'b': a batch takes one sweep; run a second batch for this one",
     "batch sweep.toml --formats stl step": "SWEEP = 'step': is a format; several take commas: --formats stl,step",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
-    "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",
     "estimate unit.toml --model pubished": "--model = 'pubished': unknown name; closest: published; "
     "nearest accepted: 'published'",
     "estimate unit.toml --frequency 125hz": "--frequency = '125hz': takes a number (HZ), such as 1",

@@ -76,7 +76,7 @@ def say_error(error: UnitcadError, form: Form) -> None:
 _LONGEST = 2000
 """Characters of an error that are printed."""
 _ARGUMENTS = {
-    "spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET", "hash": "HASH", "tables": "--table",
+    "spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET", "hash": "HASH",
     "campaign": "CAMPAIGN", "fit": "LAB",
 }  # fmt: skip
 """What the command line calls parameters that are no options, or options of another name."""

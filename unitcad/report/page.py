@@ -100,9 +100,6 @@ def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
         warn(f"warning: no {BENCH}: {error}")
 
 
-_TABLE_OF_PAGE = "the batch's command with --table json makes the table that the page is made of"
-
-
 def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str, Any], str, dict[str, str]]:
     """Collect the page's data, its title, and why a result is damaged by its folder's name.
 
@@ -121,12 +118,8 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
         folders = read_results.variant_folders(folder)
         try:
             batch = read_results.read_batch(folder)
-            listed = None if batch else read_results.rows_of_csv(folder)
-            if listed is not None and listed > len(folders):
-                some = f"{listed} variants, of which {len(folders)} have a folder"
-                damaged[read_results.CSV] = f"{some}; {_TABLE_OF_PAGE}"
         except UnitcadError as error:
-            damaged[read_results.name_in(folder)] = str(error)
+            damaged[read_results.JSON] = str(error)
         if not folders and not batch:
             why = "; ".join(damaged.values()) or "no manifest.json in it or right below it"
             raise UnitcadError(f"{folder}: has no result of unitcad ({why})")

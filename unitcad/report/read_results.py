@@ -7,8 +7,6 @@ file opened, and no code of a spec run. Unreadable files are named with the reas
 from __future__ import annotations
 
 import base64
-import csv
-import io
 import json
 import os
 from collections.abc import Iterable, Iterator
@@ -20,7 +18,7 @@ from msgspec import UNSET, Struct, UnsetType, structs
 
 from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
-from unitcad.errors import Refusal, UnitcadError, misfit, missing_extra
+from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.files import TEMPORARY
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.manifest import Manifest
@@ -119,54 +117,17 @@ def expect(data: Any, kind: Any, path: Path) -> None:
         raise UnitcadError(f"{path}: is not a result of unitcad: {misfit(error)}") from None
 
 
-JSON, PARQUET, CSV = BATCH_TABLES = ("batch.json", "variants.parquet", "variants.csv")
-HEAD = b"unitcad"
-"""Key of a Parquet file's metadata with the content of batch.json except its rows, as JSON."""
+JSON, CSV = BATCH_TABLES = ("batch.json", "variants.csv")
 
 
 def read_batch(folder: Path) -> dict[str, Any] | None:
     """Read the table of a batch's folder; None without one. Raises UnitcadError if it can't be read."""
     try:
-        batch, path = files.read_json(folder / JSON, largest=files.LARGEST_TABLE, links=False), folder / JSON
-    except files.NotThere:
-        try:
-            batch, path = read_parquet(folder / PARQUET), folder / PARQUET
-        except files.NotThere:
-            return None
-    expect(batch, BatchFile, path)
-    return batch
-
-
-def name_in(folder: Path) -> str:
-    """Return the name of the table that `read_batch` reads in a folder."""
-    return JSON if os.path.lexists(folder / JSON) else PARQUET
-
-
-def read_parquet(path: Path) -> dict[str, Any]:
-    """Return the head of a Parquet table with its rows, as batch.json has them.
-
-    Raises NotThere, Missing without the extra, UnitcadError for another file.
-    """
-    content = files.read(path, largest=files.LARGEST_TABLE, links=False)
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError:
-        raise missing_extra("parquet", f"{path}: needs pyarrow") from None
-    try:
-        table = parquet.read_table(pa.BufferReader(content))
-        return {**json.loads((table.schema.metadata or {})[HEAD]), "variants": table.to_pylist()}
-    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
-        raise UnitcadError(f"{path}: is not the table of a batch, or damaged ({type(error).__name__})") from None
-
-
-def rows_of_csv(folder: Path) -> int | None:
-    """Count the variants in the CSV table of a folder, None without one. Raises UnitcadError."""
-    try:
-        text = files.read_text(folder / CSV, largest=files.LARGEST_TABLE, links=False)
+        batch = files.read_json(folder / JSON, largest=files.LARGEST_TABLE, links=False)
     except files.NotThere:
         return None
-    return sum(1 for row in csv.reader(io.StringIO(text)) if row) - 1
+    expect(batch, BatchFile, folder / JSON)
+    return batch
 
 
 MANIFEST = "manifest.json"

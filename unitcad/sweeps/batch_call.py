@@ -10,7 +10,7 @@ from typing import Any
 
 from unitcad import text
 from unitcad.arguments import check_number, path, texts
-from unitcad.errors import UnitcadError, WrongArgument, unknown_name
+from unitcad.errors import UnitcadError
 from unitcad.pipeline.plan import check_outputs
 from unitcad.pipeline.subjects import subject
 from unitcad.report import write_report
@@ -21,7 +21,6 @@ from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Preview, RefusedVariant, Summary
-from unitcad.sweeps.results import TABLES
 from unitcad.sweeps.run import BatchOptions, Watch, count_variants, run, trim
 from unitcad.sweeps.sweep import Sweep, load_sweep
 from unitcad.validation import Changes
@@ -78,11 +77,11 @@ class BatchResult:
     def rows(self) -> list[dict[str, Any]]:
         """A row a variant, as in batch.json: the swept values, volumes in mm3, masses in g, edge levels.
 
-        Raises UnitcadError if the folder has gone, or has neither batch.json nor variants.parquet.
+        Raises UnitcadError if the folder or its batch.json has gone.
         """
         table = read_batch(self.folder)
         if table is None:
-            raise UnitcadError(f"{self.folder}: has neither batch.json nor variants.parquet")
+            raise UnitcadError(f"{self.folder}: has no batch.json")
         return table["variants"]
 
     def __repr__(self) -> str:
@@ -131,7 +130,6 @@ def batch(
     keep_going: bool = False,
     cache: str | os.PathLike[str] | None = None,
     report: bool = False,
-    tables: Sequence[str] | str | None = None,
 ) -> BatchResult:
     """Make every variant of a sweep, each distinct part once. The same call again resumes an interrupted one.
 
@@ -155,8 +153,6 @@ def batch(
         Folder of the cache. Default: the user's.
     report : bool, default False
         Write report.html.
-    tables : str or sequence of str, optional
-        Any of csv, json, parquet. Default: csv and json; parquet from 10,000 variants.
 
     Returns
     -------
@@ -182,17 +178,8 @@ def batch(
     wanted = chosen.overridden({**changes_of(set), **own})
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
-    listed = check_tables(None if tables is None else texts("tables", tables), report)
-    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where, tables=listed)
+    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where)
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
         write_report(folder)
     return BatchResult(folder, summary)
-
-
-def check_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str, ...] | None:
-    """Return names of tables; with `report` the page's is among them. Raises WrongArgument for an unknown one."""
-    for name in names or ():
-        if name not in TABLES:
-            raise unknown_name("tables", name, TABLES, WrongArgument)
-    return None if names is None and not report else (*(names or ("csv",)), *(("json",) if report else ()))

@@ -24,7 +24,6 @@ from unitcad.cli.shared_options import (
     allow_code,
     expect_commas,
     finite,
-    names_in,
     outputs,
     overrides,
 )
@@ -33,7 +32,7 @@ from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.batch_call import check_tables, make, preview
+from unitcad.sweeps.batch_call import make, preview
 from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.journal import Preview, Summary
 from unitcad.sweeps.run import BatchOptions, Watch
@@ -143,10 +142,6 @@ def batch(
     cache_limit: Annotated[
         float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="Maximum cache size after the batch.")
     ] = 4096,
-    table: Annotated[
-        str | None,
-        typer.Option(metavar="NAMES", help="Tables: csv,json,parquet. Default: csv,json below 10,000 variants."),
-    ] = None,
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
@@ -170,14 +165,12 @@ def batch(
     expect_commas("SWEEP", others)
     if others:
         raise Refusal("SWEEP", others[0], "a batch takes one sweep; run a second batch for this one")
-    tables = names_in(table) if table is not None else None
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
-    usual = only is None and not (table or scheduler)
-    page = usual and wanted.count <= PAGE_UP_TO if page is None else page
-    listed = check_tables(tables, page)
-    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, listed)
+    if page is None:
+        page = only is None and scheduler is None and wanted.count <= PAGE_UP_TO
+    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)

@@ -1,4 +1,4 @@
-"""The batch's tables: variants.csv, batch.json, variants.parquet, the same bytes however many workers made them."""
+"""The batch's tables: variants.csv and batch.json, the same bytes however many workers made them."""
 
 from __future__ import annotations
 
@@ -6,86 +6,19 @@ import contextlib
 import csv
 import io
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator
-from importlib.util import find_spec
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
 from msgspec import to_builtins
 
 from unitcad import files
-from unitcad.errors import missing_extra
-from unitcad.report.read_results import CSV, HEAD, JSON, PARQUET
+from unitcad.report.read_results import CSV, JSON
 from unitcad.sweeps.insensitive_keys import SweptEstimate
 from unitcad.sweeps.journal import BatchHead, Journal, JournalEntry, Summary, Values
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import cell
 
-GROUP = 1 << 15
-"""Rows of a row group: as many are in memory while a table is written."""
-_INTEGERS = range(-(1 << 63), 1 << 63)
-
-
-def can_write() -> bool:
-    """Tell whether the extra is installed."""
-    return find_spec("pyarrow") is not None
-
-
-def write_parquet(path: Path, head: Values, columns: list[str], rows: Callable[[], Iterable[Values]]) -> None:
-    """Write rows, read twice: a column's type is that of all its values, text (JSON) if they have several.
-
-    Raises Missing without the extra, OSError.
-    """
-    if not can_write():
-        raise missing_extra("parquet", "a Parquet table needs pyarrow")
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    kinds: dict[str, set[str]] = {column: set() for column in columns}
-    for row in rows():
-        for column, value in row.items():
-            if value is not None:
-                kinds[column].add(_kind(value))
-    types = {"bool": pa.bool_(), "int": pa.int64(), "float": pa.float64()}
-    chosen = {column: _of(kinds[column]) for column in columns}
-    text = json.dumps(head, ensure_ascii=False, allow_nan=False).encode()
-    schema = pa.schema([(column, types.get(chosen[column], pa.string())) for column in columns], metadata={HEAD: text})
-    with files.writing(path) as file, parquet.ParquetWriter(file, schema, compression="zstd") as writer:
-        for group in _groups(iter(rows())):
-            data = {column: [_parquet_cell(row.get(column), chosen[column]) for row in group] for column in columns}
-            writer.write_table(pa.Table.from_pydict(data, schema))
-
-
-def _groups(rows: Iterator[Values]) -> Iterator[list[Values]]:
-    while group := list(islice(rows, GROUP)):
-        yield group
-
-
-def _kind(value: Any) -> str:
-    if isinstance(value, bool):
-        return "bool"
-    if isinstance(value, int):
-        return "int" if value in _INTEGERS else "other"
-    return "float" if isinstance(value, float) else "text" if isinstance(value, str) else "other"
-
-
-def _of(kinds: set[str]) -> str:
-    """Return the one kind of a column's values; "other" if there is none."""
-    if kinds == {"int", "float"}:
-        return "float"
-    return next(iter(kinds)) if len(kinds) == 1 else "text" if not kinds else "other"
-
-
-def _parquet_cell(value: Any, kind: str) -> Any:
-    if value is None or kind in ("bool", "int", "text"):
-        return value
-    return float(value) if kind == "float" else json.dumps(value, ensure_ascii=False)
-
-
-TABLES = {"csv": CSV, "json": JSON, "parquet": PARQUET}
-MOST_ROWS = 10_000
-"""Rows from which on CSV and JSON are written only if asked for."""
 FIRST = ("index", "status", "reason", "folder")
 
 
@@ -95,31 +28,11 @@ def write_results(
     entries: Callable[[], Iterable[JournalEntry]],
     head: BatchHead,
     estimate: SweptEstimate | None,
-    asked: Collection[str] | None = None,
-    variants: int = 0,
 ) -> None:
-    """Write the tables `asked` for (names of TABLES), and those that are there from before.
-
-    With None these are CSV and JSON below MOST_ROWS `variants`, otherwise Parquet if its extra is installed. `entries`
-    gives the variants in the sweep's order, one at a time. Raises Missing for Parquet without the extra, OSError.
-    """
-    asked = tables_of(variants, asked)
-    wanted = {name for name, file in TABLES.items() if name in asked or (out / file).is_file()}
+    """Write both tables. `entries` gives the variants in the sweep's order, one at a time. Raises OSError."""
     levels = {"estimate": to_builtins(estimate)} if estimate else {}
-    whole = {**to_builtins(head), **levels, "columns": columns}
-    if "parquet" in wanted:
-        write_parquet(out / TABLES["parquet"], whole, columns, lambda: map(flat, entries()))
-    if "csv" in wanted:
-        _write_csv(out / TABLES["csv"], columns, entries())
-    if "json" in wanted:
-        _write_json(out / TABLES["json"], whole, entries())
-
-
-def tables_of(variants: int, asked: Collection[str] | None) -> Collection[str]:
-    """Return the names of a batch's tables: those `asked` for; with None by the number of variants."""
-    if asked is not None:
-        return asked
-    return ("csv", "json") if variants < MOST_ROWS or not can_write() else ("parquet",)
+    _write_csv(out / CSV, columns, entries())
+    _write_json(out / JSON, {**to_builtins(head), **levels, "columns": columns}, entries())
 
 
 def write_timings(out: Path, summary: Summary, workers: int) -> None:

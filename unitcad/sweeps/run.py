@@ -48,8 +48,7 @@ class BatchOptions:
     """Options of a run.
 
     `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
-    of finished variants, not only their sizes. `tables` are names of results.TABLES, None chooses by the number of
-    variants.
+    of finished variants, not only their sizes.
     """
 
     only: Sequence[str] = OUTPUTS
@@ -60,7 +59,6 @@ class BatchOptions:
     cache: Path | None = None
     cache_mb: float = DEFAULT_LIMIT_MB
     verify: bool = False
-    tables: Sequence[str] | None = None
 
 
 def run(
@@ -117,7 +115,7 @@ def finish(
     count = summary.variants
     found = swept_estimate(sweep, count) if "estimate" in head.outputs else None
     summary.warnings += insensitive_warnings(found)
-    write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found, options.tables, count)
+    write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found)
     summary.seconds = round(time.perf_counter() - start, 3)
     write_timings(journal.out, summary, workers)
 
