@@ -118,6 +118,7 @@ MODEL_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodel+xml"
 RELS_TYPE = "application/vnd.openxmlformats-package.relationships+xml"
 _FREE = 1_000_000  # bytes that may inflate at any ratio
 _MEDIA = re.compile(r"^[!#$%&'*+\-.^_`|~\w]+/[!#$%&'*+\-.^_`|~\w]+(\s*;.*)?$", re.ASCII)
+_ODD = re.compile(r"[\\\x00-\x1f\x7f]|%2f|%5c", re.IGNORECASE)
 _SCHEME = re.compile(r"^[A-Za-z][A-Za-z0-9+.\-]*:")
 
 
@@ -254,8 +255,8 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
     bombs = []
     for info in entries:
-        if why := _unsafe(info.filename):
-            package.add(P005, f"{info.filename!r} {why}", info.filename)
+        if _unsafe(info.filename):
+            package.add(P005, f"{info.filename!r} is no plain relative name", info.filename)
         if not info.filename or info.is_dir():
             continue
         key = unquote(info.filename).lower().lstrip("/")
@@ -278,25 +279,10 @@ def _after_the_end(data: memoryview) -> int:
     return max(0, len(tail) - at - 22 - int.from_bytes(tail[at + 20 : at + 22], "little")) if at >= 0 else 0
 
 
-def _unsafe(name: str) -> str | None:
-    """Return why a zip entry's name may not be a part's, or None."""
-    if name.startswith("/") or _SCHEME.match(name):
-        return "is absolute"
-    if "\\" in name:
-        return "has a backslash"
-    if any(ord(c) < 32 or ord(c) == 127 for c in name):
-        return "has a control character"
-    segments = (name[:-1] if name.endswith("/") else name).split("/")
-    decoded = [unquote(segment) for segment in segments]
-    if ".." in decoded:
-        return "climbs out of the package"
-    if any(not segment or segment.strip(".") == "" for segment in decoded):
-        return "has an empty segment"
-    if any(segment.endswith(".") for segment in decoded):
-        return "has a segment that ends with a dot"
-    if re.search(r"%(2f|5c)", name, re.IGNORECASE):
-        return "has an escaped slash"
-    return None
+def _unsafe(name: str) -> bool:
+    """Return whether a zip entry's name may not be a part's: it is not relative, climbs, or systems read it apart."""
+    segments = [unquote(segment) for segment in name.removesuffix("/").split("/")]
+    return bool(_ODD.search(name) or _SCHEME.match(name) or any(not part or part.endswith(".") for part in segments))
 
 
 def _content_types(package: Package) -> None:
