@@ -20,7 +20,7 @@ from xml.parsers import expat
 
 from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted
-from unitcad.meshcheck.rules.f_file import F003, F006, F009, F011, Deadline, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F003, F009, F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P006, P007, P008
 from unitcad.meshcheck.rules.registry import Rule
 
@@ -248,8 +248,6 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
         raise F003.unreadable(f"the zip cannot be read: {error}") from error
     package = Package(archive, limits, deadline, strict=strict)
-    if extra := _after_the_end(data):
-        package.findings.append(F006.finding(f"{counted(extra, 'byte')} after the zip's end record", extra))
     entries = archive.infolist()
     if len(entries) > limits.max_entries:
         raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
@@ -270,13 +268,6 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise Unreadable(*package.findings, P008.finding(bombs[0], len(bombs)))
     _content_types(package)
     return package
-
-
-def _after_the_end(data: memoryview) -> int:
-    """Return bytes after the end record and its comment, which zipfile skips in silence (APPNOTE 4.3.16)."""
-    tail = bytes(data[-(1 << 16) - 22 :])
-    at = tail.rfind(b"PK\x05\x06")
-    return max(0, len(tail) - at - 22 - int.from_bytes(tail[at + 20 : at + 22], "little")) if at >= 0 else 0
 
 
 def _unsafe(name: str) -> bool:
