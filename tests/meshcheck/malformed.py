@@ -93,8 +93,6 @@ def _packages():
         ("rels-bad.3mf", "P002", package(rels="<Relationships")),
         ("rel-no-id.3mf", "P002", package(rels=ROOT_RELS.replace('Id="r0"', ""))),
         ("thumbnail-gone.3mf", "P002", package(rels=rels_xml((START, "/3D/3dmodel.model"), (THUMBNAIL, "/a.png")))),
-        ("thumbnail-unrelated.3mf", "P002", package(
-            model_xml(f'<object id="1" thumbnail="/a.png">{mesh_xml()}</object>'), more=[("a.png", PNG)])),
         ("no-start.3mf", "P003", package(rels=rels_xml())),
         ("start-gone.3mf", "P003", package(rels=rels_xml((START, "/3D/other.model")))),
         ("two-starts.3mf", "P003", package(

@@ -52,7 +52,6 @@ def files():
         ("trailing.stl", "F006", good + b"xyz"),
         ("facets-after-endsolid.stl", "F003", text_stl(box()) + text_stl(box(at=(20, 0, 0))).split("\n", 1)[1]),
         ("trailing-text.stl", "F006", text + "made by hand\n"),
-        ("trailing.3mf", "F006", package() + b"xyz"),
         ("solid-header.stl", "F007", stl(box(), header=b"solid made by a program")),
         ("bom.stl", "F009", b"\xef\xbb\xbf" + text.encode()),
         ("cr-only.stl", "F009", text.replace("\n", "\r")),

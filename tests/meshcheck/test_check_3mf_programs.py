@@ -43,7 +43,6 @@ LENIENT = {
     "P017 paint": package(model_xml(f'<object id="1">{mesh_xml(per_face=PAINTED)}</object>')),
     "P017 metadata": package(model_xml(before=2 * '<metadata name="Title">a</metadata>')),
     "P002 thumbnail": package(rels=rels_xml((START, "/3D/3dmodel.model"), (THUMBNAIL, "/Metadata/thumbnail.png"))),
-    "P002 of an object": package(model_xml(f'<object id="1" thumbnail="/a.png">{mesh_xml()}</object>')),
     "P019 default": package(model_xml(f'{COLORS}<object id="1">{mesh_xml(per_face=COLORED)}</object>')),
     "P019 components": package(model_xml(
         f'{COLORS}{OBJECT}<object id="3" pid="2"><components><component objectid="1"/></components></object>',

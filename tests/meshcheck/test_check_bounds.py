@@ -1,8 +1,5 @@
 """Piles of faces and shells: what would take all time or memory is bounded, and found is what was found by then."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from shapes import box, finding, stl
@@ -76,17 +73,3 @@ def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypat
     monkeypatch.setattr(boxes, "MOST_PAIRS", len(expected) - 1)
     with pytest.raises(TooMany):
         boxes.box_pairs(low, high, lambda: None)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no limit of memory there")
-@pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
-def test_a_file_larger_than_the_memory_allows_is_refused_by_its_size(name, tmp_path):
-    with (tmp_path / name).open("wb") as file:
-        file.truncate(260_000_000)
-    done = subprocess.run(
-        [sys.executable, "-m", "unitcad", "check", name, "--memory", "1000"],
-        cwd=tmp_path, capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.stdout.splitlines()[0] == (
-        f"{name}: F011 error: 260000000 bytes, more than a quarter of the 1000 MB of memory (--memory)"
-    )

@@ -174,7 +174,7 @@ def test_what_is_no_file_in_a_folder_is_found(tmp_path):
     done = run(tmp_path)
     assert done.returncode == 1
     assert re.search(r"gone\.stl.*F012.*no such file", done.stdout)
-    assert re.search(r"pipe\.stl.*F012.*a FIFO", done.stdout)
+    assert re.search(r"pipe\.stl.*F012.*a pipe", done.stdout)
 
 
 @pytest.mark.parametrize(

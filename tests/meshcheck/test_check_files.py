@@ -43,7 +43,8 @@ def test_what_is_no_regular_file_is_named_and_never_opened(tmp_path):
             for path in (tmp_path / "a.stl", tmp_path / "b.stl", tmp_path / "c.stl", "/dev/null")
         ]
     assert [[(found.code, found.message) for found in found] for found in said] == [
-        [("F012", f"{kind}, not a regular file")] for kind in ("a FIFO", "a folder", "a socket", "a device")
+        [("F012", f"cannot be read: is {kind}, not a regular file")]
+        for kind in ("a pipe", "a folder", "a socket", "a device")
     ]
     assert check_file(tmp_path / "no.stl").findings[0].message == "no such file"
     assert check_file("a\0.stl").findings[0].code == "F012"

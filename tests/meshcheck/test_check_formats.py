@@ -65,31 +65,6 @@ def test_sarif_is_valid_and_complete(reports):
         assert " " not in result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
 
 
-def fingerprints(*reports):
-    return {result["partialFingerprints"]["pathAndRule/v1"] for result in sarif_of(*reports)["results"]}
-
-
-def test_fingerprints_stay_when_counts_and_places_change(tmp_path):
-    found = []
-    for content in (stl(box()[2:]), stl(box((20, 20, 20))[4:])):
-        (tmp_path / "a.stl").write_bytes(content)
-        found.append(fingerprints(check_file(tmp_path / "a.stl")))
-    assert found[0] == found[1] != set()
-
-
-def test_fingerprints_are_those_of_the_file_however_it_is_named(tmp_path, monkeypatch):
-    (tmp_path / "sub").mkdir()
-    monkeypatch.chdir(tmp_path)
-
-    def print_of(*paths):
-        return fingerprints(*(FileReport(path, (Finding("T001", "error", "x"),)) for path in paths))
-
-    names = ["sub/a.stl", "./sub/a.stl", str(tmp_path / "sub" / "a.stl"), "sub/../sub/a.stl"]
-    assert len(print_of(*names)) == 1
-    assert print_of("a.stl") != print_of("sub/a.stl")
-    assert print_of(str(tmp_path) + "2/a.stl") != print_of("2/a.stl")
-
-
 def test_github_annotations_are_escaped(reports):
     *lines, last = render(reports, "github").splitlines()
     assert last == "4 files: 2 failed, 1 warned, 1 passed"

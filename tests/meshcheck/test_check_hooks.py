@@ -184,15 +184,16 @@ def test_the_settings_on_the_page_are_settings(tmp_path, monkeypatch):
     page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     monkeypatch.chdir(tmp_path)
     shown = re.findall(r"```toml\n# (\S+)\n(.*?)```", page, re.DOTALL)
-    assert [name for name, _ in shown] == ["unitcad.toml", "pyproject.toml"]
+    assert [name for name, _ in shown] == ["unitcad.toml"]
     for name, text in shown:
         (tmp_path / name).write_text(text)
         found = check_command.find(name)
         assert found.ignored("scans/a.stl")
-        if name == "unitcad.toml":  # it shows every key there is
-            assert all(value is not None for value in structs.asdict(found.settings).values())
-            (tmp_path / "part.stl").write_bytes(stl(box()))
-            assert run("part.stl", cwd=tmp_path).returncode == 0
+        assert all(value is not None for value in structs.asdict(found.settings).values()), (
+            "it shows every key there is"
+        )
+        (tmp_path / "part.stl").write_bytes(stl(box()))
+        assert run("part.stl", cwd=tmp_path).returncode == 0
 
 
 def test_the_actions_inputs_are_not_pasted_into_its_script():

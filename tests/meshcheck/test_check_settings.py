@@ -1,4 +1,4 @@
-"""Settings of `unitcad check` in unitcad.toml and pyproject.toml: found upwards, beaten by the command line."""
+"""Settings of `unitcad check` in unitcad.toml: found upwards, beaten by the command line."""
 
 import json
 from pathlib import Path
@@ -19,19 +19,13 @@ def folder(tmp_path):
     return tmp_path
 
 
-TOOL = "[tool.unitcad.check]"
-
-
 def codes(result):
     files = json.loads(result.stdout)["files"]
     return {Path(entry["path"]).name: [found["code"] for found in entry["findings"]] for entry in files}
 
 
-@pytest.mark.parametrize(
-    ("name", "head"),
-    [(f"{where}.toml", head) for where, head in [("unitcad", "[check]"), ("unitcad", TOOL), ("pyproject", TOOL)]],
-)
-def test_the_nearest_file_upwards_is_used_and_named(folder, name, head):
+def test_the_nearest_file_upwards_is_used_and_named(folder):
+    name, head = "unitcad.toml", "[check]"
     (folder / name).write_text(f'{head}\nselect = ["F007"]\n')
     result = run(".", "--json", cwd=folder / "sub" / "deep")
     assert json.loads(result.stdout)["config"] == f"../../{name}"
@@ -43,29 +37,9 @@ def test_the_nearest_file_upwards_is_used_and_named(folder, name, head):
 
 def test_files_without_our_table_are_passed_over(folder):
     (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
-    (folder / "sub" / "pyproject.toml").write_text("[tool.other]\nkey = 1\n")
     (folder / "sub" / "deep" / "unitcad.toml").write_text('design = "embedded"\nselect = "a spec is no settings"\n')
     assert json.loads(run(".", "--json", cwd=folder / "sub" / "deep").stdout)["config"] == "../../unitcad.toml"
     assert run("hole.stl", cwd=folder / "sub").returncode == 0
-
-
-def test_a_pyproject_that_does_not_mention_us_may_be_broken(folder):
-    """Also with an escape in it, with which our name may be written."""
-    (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
-    broken = folder / "sub" / "pyproject.toml"
-    broken.write_text("[tool.other\nkey = 1\n")
-    assert json.loads(run("hole.stl", "--json", cwd=folder / "sub").stdout)["config"] == "../unitcad.toml"
-    broken.write_text("[tool.unitcad.check\n")
-    assert run("hole.stl", cwd=folder / "sub").returncode == 2
-    broken.write_text('[tool."\\u0075nitcad".check]\nselect = ["F"]\n')
-    assert json.loads(run("hole.stl", "--json", cwd=folder / "sub").stdout)["config"] == "pyproject.toml"
-
-
-def test_unitcad_toml_comes_before_pyproject(folder):
-    (folder / "unitcad.toml").write_text("[check]\n")
-    (folder / "pyproject.toml").write_text('[tool.unitcad.check]\nfail-on = "warning"\n')
-    assert json.loads(run("sub/warn.stl", "--json", cwd=folder).stdout)["config"] == "unitcad.toml"
-    assert run("sub/warn.stl", cwd=folder).returncode == 0
 
 
 def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folder):
@@ -91,8 +65,7 @@ def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folde
     (folder / "a.3mf").write_bytes(package(model_xml(attributes='unit="millimeter" vendor="x"')))
     set_, beaten = both("3mf-strict = true", "a.3mf", "--no-3mf-strict")
     assert (set_.returncode, beaten.returncode) == (1, 0)
-    both("memory = 4000", film)
-    assert run("sub/deep/film.stl", "--no-config", cwd=folder).returncode == 0
+    assert both("memory = 4000", film)[0].returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -147,18 +120,15 @@ def test_a_wrong_setting_is_one_clear_error(folder, content, said, near):
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"error: {said}")
     assert near in line
-    assert run("sub/warn.stl", "--no-config", cwd=folder).returncode == 0
 
 
-def test_config_names_a_file_and_no_config_reads_none(folder):
+def test_config_names_a_file(folder):
     (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
     (folder / "strict.toml").write_text('[check]\nfail-on = "warning"\n[other]\nkey = 1\n')
     (folder / "empty.toml").write_text("")
-    assert json.loads(run("sub/hole.stl", "--json", "--no-config", cwd=folder).stdout)["config"] is None
-    assert run("sub/hole.stl", "--no-config", cwd=folder).returncode == 1
     result = run("sub/hole.stl", "--json", "--config", "strict.toml", cwd=folder)
     assert (json.loads(result.stdout)["config"], result.returncode) == ("strict.toml", 1)
-    for more in (["none.toml"], ["empty.toml"], ["sub"], ["strict.toml", "--no-config"]):
+    for more in (["none.toml"], ["empty.toml"], ["sub"]):
         result = run("sub/hole.stl", "--config", *more, cwd=folder)
         assert (result.returncode, len(result.stderr.splitlines())) == (2, 1)
 

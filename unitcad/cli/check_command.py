@@ -1,15 +1,13 @@
 """unitcad check.
 
-The settings of `unitcad check` in a file: table [check] of unitcad.toml, or [tool.unitcad.check] of pyproject.toml.
-
-The nearest file with such a table, from the working directory upwards, is used; in one folder unitcad.toml comes first.
+Its settings are the table [check] of the nearest unitcad.toml with one, from the working directory upwards.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
@@ -51,19 +49,18 @@ class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, re
     memory: Annotated[int, Meta(ge=200)] | None = None
 
 
-NAMES = ("unitcad.toml", "pyproject.toml")
+NAME = "unitcad.toml"
 
 
 class Configuration(Struct, frozen=True, kw_only=True):
-    """Settings with the file they come from, None for none, and the table's name there."""
+    """Settings with the file they come from, None for none."""
 
     settings: Settings = Settings()
     path: Path | None = None
-    table: str = ""
 
     def name(self, key: str) -> str:
         """Name a key in an error: file, table and key."""
-        return f"{self.shown}: {self.table}.{key}"
+        return f"{self.shown}: check.{key}"
 
     def chosen(self, key: str, given: Any) -> tuple[str, Any]:
         """Return an option's name and the value `given` to it; without one, the name and the value of its setting."""
@@ -105,61 +102,41 @@ def _fits(path: str, pattern: str) -> bool:
     return fnmatchcase(path, pattern) or ("/" not in pattern and fnmatchcase(Path(path).name, pattern))
 
 
-def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
-    """Read the settings of the file `named`, else of the nearest one that has any; without `wanted` none.
+def find(named: str | None = None) -> Configuration:
+    """Read the settings of the file `named`, else of the nearest one that has any.
 
     Raises UnitcadError for a file that can't be read, Refusal for a key or value that can't be.
     """
-    if not wanted:
-        if named is not None:
-            raise UnitcadError("--config and --no-config exclude each other")
-        return Configuration()
     if named is not None:
         configuration = _read(Path(named))
         if configuration is None:
-            raise UnitcadError(f"--config {named}: has no table [{_table(Path(named), {})}]")
+            raise UnitcadError(f"--config {named}: has no table [check]")
         return configuration
     here = Path.cwd()
     for folder in (here, *here.parents):
-        for name in NAMES:
-            if (folder / name).is_file() and (configuration := _read(folder / name)):
-                return configuration
+        if (folder / NAME).is_file() and (configuration := _read(folder / NAME)):
+            return configuration
     return Configuration()
-
-
-def _table(path: Path, data: Mapping[str, Any]) -> str:
-    """Name the table: unitcad.toml takes pyproject.toml's name for it as well."""
-    return "tool.unitcad.check" if path.name == "pyproject.toml" or "tool" in data else "check"
 
 
 def _read(path: Path) -> Configuration | None:
     """Read the settings of a file; None without such a table. A unit's spec named unitcad.toml has none."""
-    shown, text = path_seen_from(path.absolute()), files.read_text(path)
-    if path.name == "pyproject.toml" and "unitcad" not in text and "\\" not in text:  # with escapes it may be meant
+    shown = path_seen_from(path.absolute())
+    data: Any = parse_toml(files.read_text(path), shown)
+    if "design" in data:
         return None
-
-    data: Any = parse_toml(text, shown)
-    table = _table(path, data)
-    *above, last = table.split(".")
-    if not above and "design" in data:
-        return None
-    for key in above:
-        data = data.get(key, {})
-        if not isinstance(data, Mapping):
-            return None
     try:
-        if data and (above or path.name in NAMES):
-            for key in data:
-                if key != last:
-                    raise unknown_key(".".join([*above, key]), data[key], [last])
-        if last not in data:
+        for key in data if path.name == NAME else ():
+            if key != "check":
+                raise unknown_key(key, data[key], ["check"])
+        if "check" not in data:
             return None
         from unitcad.spec.convert import convert
 
-        settings = convert(data[last], Settings, table)
+        settings = convert(data["check"], Settings, "check")
     except Refusal as error:
         raise Refusal(f"{shown}: {error.field}", error.value, error.limit, error.nearest) from None
-    return Configuration(settings=settings, path=path.absolute(), table=table)
+    return Configuration(settings=settings, path=path.absolute())
 
 
 def check(
@@ -239,7 +216,6 @@ def check(
         str | None,
         typer.Option(metavar="FILE", help="Settings: a TOML file with a [check] table. Default: the nearest one."),
     ] = None,
-    no_config: Annotated[bool, typer.Option("--no-config", help="Read no settings.")] = False,
     explain: Annotated[
         list[str] | None,
         typer.Option(metavar="CODES", help="Explain mesh rules and mould checks (C...). No file is checked."),
@@ -261,7 +237,7 @@ def check(
     if pictures is not None and Path(pictures).exists() and not Path(pictures).is_dir():
         raise Refusal("--pictures", pictures, "must name a folder; this is a file")
     copies = [_copy(given, FORMATS) for given in report or []]
-    configuration = find(config, wanted=not no_config)
+    configuration = find(config)
     settings = configuration.settings
     level = fail_on or settings.fail_on or "error"
     if level not in ("error", "warning"):

@@ -9,7 +9,6 @@ import contextlib
 import glob
 import os
 import signal
-import stat
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -18,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from unitcad import files
+from unitcad.errors import UnitcadError
 from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
@@ -32,14 +33,6 @@ from unitcad.meshcheck.rules.inspection import Options
 from unitcad.meshcheck.rules.p_package import P011
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
 from unitcad.workers import Pool, WorkerEnded, limit_memory
-
-_KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a FIFO",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
 
 
 def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) -> FileReport:
@@ -167,16 +160,15 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
 def _bytes_of(path: Path, limits: Limits) -> bytes:
     """Read the content of a regular file, once its size is known. A FIFO is never opened, since that would wait."""
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise F012.unreadable(f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
-        limits.check_bytes(status.st_size)
-        with path.open("rb") as file:
-            return file.read(status.st_size)
+        size = path.stat().st_size
+        if size > limits.max_bytes:
+            raise F011.unreadable(f"{size} bytes, more than the limit of {limits.max_bytes}")
+        return files.read(path, largest=size)
     except FileNotFoundError as error:
         raise F012.unreadable(no_such_file(path)) from error
-    except (OSError, ValueError) as error:
-        raise F012.unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    except (OSError, ValueError, UnitcadError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise F012.unreadable(f"cannot be read: {why.removeprefix(f'{path}: ')}") from error
 
 
 def _check_surface(
@@ -206,7 +198,7 @@ def expand(
     `left_out`: the files of folders and globs to skip. A folder's STEP files that cannot be
     read here give a warning each, since they were not named.
     """
-    files: list[str] = []
+    found: list[str] = []
     empty: list[FileReport] = []
     for name in names:
         path = Path(name)
@@ -219,15 +211,15 @@ def expand(
                     warning = F012.finding(f"{needs}; not checked", severity="warning")
                     empty.append(FileReport(file, (warning,)))
                 else:
-                    files.append(file)
+                    found.append(file)
         elif not path.exists() and glob.has_magic(name):
             inside = _inside(p for p in glob.glob(name, recursive=True) if os.path.isfile(p) and not left_out(p))
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no file matches"),)))
-            files += inside
+            found += inside
         else:
-            files.append(name)
-    return _once(files), empty
+            found.append(name)
+    return _once(found), empty
 
 
 def _walk(folder: Path) -> Iterator[str]:

@@ -5,9 +5,7 @@ SARIF 2.1.0 is as OASIS defines it and GitHub code scanning reads it.
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -172,7 +170,7 @@ _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def sarif_log(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only."""
+    """Return one run with every rule and a result a finding."""
     index = {code: i for i, code in enumerate(rules())}
     return {
         "$schema": SCHEMA,
@@ -215,22 +213,14 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
         physical["region"] = {"startLine": max(line, 1)}
     objects = dict.fromkeys(place.object for place in finding.locations if place.object)
     logical = {"logicalLocations": [{"name": name, "kind": "object"} for name in objects]} if objects else {}
-    fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{finding.code}".encode()).hexdigest()
     return {
         "ruleId": finding.code,
         "ruleIndex": index[finding.code],
         "level": _LEVELS[finding.severity],
         "message": {"text": f"{with_places(finding, 1)}. Fix: {rules()[finding.code].fix}"},
         "locations": [{"physicalLocation": physical, **logical}],
-        "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": finding.count, "places": [place.as_dict() for place in finding.locations]},
     }
-
-
-def _inside(path: str) -> str:
-    """Return the path from the working directory for files in it, however they are named; otherwise the path itself."""
-    whole, here = os.path.abspath(path), os.getcwd()
-    return os.path.relpath(whole, here) if whole.startswith(os.path.join(here, "")) else path
 
 
 def _uri(path: str) -> str:

@@ -15,7 +15,7 @@ from unitcad.meshcheck.readers import threemf_package as opc
 from unitcad.meshcheck.readers.threemf_model import read_model
 from unitcad.meshcheck.readers.threemf_package import Package, Relation
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
-from unitcad.meshcheck.rules.f_file import F003, F011, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F011, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P009, P011, P012, P014, P017, P019, P020
 from unitcad.meshcheck.rules.registry import Rule
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
@@ -301,8 +301,12 @@ def _times(first: Floats, then: Floats) -> Floats:
 
 
 _IMAGES = ("image/png", "image/jpeg", "image/jpg")
-_TEXTURE_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
-_TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
+_TYPES = {
+    opc.THUMBNAIL: _IMAGES,
+    opc.TEXTURE: (*_IMAGES, "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"),
+    opc.TICKET: ("application/vnd.ms-printing.printticket+xml",),
+}
+"""Content types of parts by their relationships."""
 
 
 @dataclass(frozen=True)
@@ -377,48 +381,35 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
     """Apply P020: one thumbnail, ticket and set of properties at most, each of the type that it must have."""
     for kind in kinds:
         of = [relation for relation in relations if relation.kind == kind]
-        name = kind.rsplit("/", 1)[-1]
         if len(of) > 1:
-            package.add(P020, f"{len(of)} parts of type {name} for {who}")
-        for relation in of:
-            content_type = package.content_type(relation.target)
-            if kind == opc.THUMBNAIL:
-                _image(package, relation.target, P020)
-            elif kind == opc.TICKET and content_type != _TICKET_TYPE:
-                text = f"{package.shown(relation.target)} has type {content_type!r}, not a print ticket's"
-                package.add(P020, text, relation.target)
-            elif kind == opc.PROPERTIES:
-                package.xml(relation.target, F003)
+            package.add(P020, f"{len(of)} parts of type {kind.rsplit('/', 1)[-1]} for {who}")
+        for relation in of if kind in _TYPES else ():
+            _expect_type(package, relation.target, P020, _TYPES[kind])
 
 
-def _image(package: Package, part: str, rule: Rule, *types: str) -> None:
-    """Add a finding if a part's content type is none of an image, or of `types`."""
+def _expect_type(package: Package, part: str, rule: Rule, types: tuple[str, ...]) -> None:
+    """Add a finding if a part's content type is none of `types`."""
     content_type = package.content_type(part)
     if content_type is None:
         package.add(P001, f"{package.shown(part)} has no content type", part)
-    elif content_type not in (*_IMAGES, *types):
-        package.add(rule, f"{package.shown(part)} has type {content_type!r}, not PNG's or JPEG's", part)
+    elif content_type not in types:
+        package.add(rule, f"{package.shown(part)} has type {content_type!r}, not {' or '.join(types)}", part)
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
     """Check that parts named by path exist, and are targets of a relationship of the right type."""
     by_kind = {kind: {r.target for r in related if r.kind == kind} for kind in opc.KNOWN}
-    images = by_kind[opc.THUMBNAIL] | by_kind[opc.TEXTURE]
     for resource in model.resources.values():
-        path = resource.attributes.get("path" if resource.kind == "texture2d" else "thumbnail")
-        if path is None or resource.kind not in ("texture2d", "object"):
+        if resource.kind != "texture2d" or "path" not in resource.attributes:
             continue
+        path = resource.attributes["path"]
         part = path.lower().lstrip("/")
         if part not in package.parts:
-            rule, add = (P019, package.add) if resource.kind == "texture2d" else (P002, package.add_lenient)
-            add(rule, f"{path} of {resource.kind} {resource.id} is not in the package", model.part)
-        elif part not in (by_kind[opc.TEXTURE] if resource.kind == "texture2d" else images):
-            add = package.add if resource.kind == "texture2d" else package.add_lenient
-            add(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
-        elif resource.kind == "texture2d":
-            _image(package, part, P019, _TEXTURE_TYPE)
+            package.add(P019, f"{path} of texture2d {resource.id} is not in the package", model.part)
+        elif part not in by_kind[opc.TEXTURE]:
+            package.add(P002, f"{path} of texture2d {resource.id} has no relationship", model.part)
         else:
-            _image(package, part, P020)
+            _expect_type(package, part, P019, _TYPES[opc.TEXTURE])
     for part, written in sorted(_linked_parts(model).items()):
         if part not in package.parts:
             package.add(P012, f"{written} is not in the package", model.part)

@@ -20,7 +20,7 @@ from xml.parsers import expat
 
 from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted
-from unitcad.meshcheck.rules.f_file import F003, F006, F009, F011, Deadline, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F003, F009, F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P006, P007, P008
 from unitcad.meshcheck.rules.registry import Rule
 
@@ -118,6 +118,7 @@ MODEL_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodel+xml"
 RELS_TYPE = "application/vnd.openxmlformats-package.relationships+xml"
 _FREE = 1_000_000  # bytes that may inflate at any ratio
 _MEDIA = re.compile(r"^[!#$%&'*+\-.^_`|~\w]+/[!#$%&'*+\-.^_`|~\w]+(\s*;.*)?$", re.ASCII)
+_ODD = re.compile(r"[\\\x00-\x1f\x7f]|%2f|%5c", re.IGNORECASE)
 _SCHEME = re.compile(r"^[A-Za-z][A-Za-z0-9+.\-]*:")
 
 
@@ -247,15 +248,13 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
         raise F003.unreadable(f"the zip cannot be read: {error}") from error
     package = Package(archive, limits, deadline, strict=strict)
-    if extra := _after_the_end(data):
-        package.findings.append(F006.finding(f"{counted(extra, 'byte')} after the zip's end record", extra))
     entries = archive.infolist()
     if len(entries) > limits.max_entries:
         raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
     bombs = []
     for info in entries:
-        if why := _unsafe(info.filename):
-            package.add(P005, f"{info.filename!r} {why}", info.filename)
+        if _unsafe(info.filename):
+            package.add(P005, f"{info.filename!r} is no plain relative name", info.filename)
         if not info.filename or info.is_dir():
             continue
         key = unquote(info.filename).lower().lstrip("/")
@@ -271,32 +270,10 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     return package
 
 
-def _after_the_end(data: memoryview) -> int:
-    """Return bytes after the end record and its comment, which zipfile skips in silence (APPNOTE 4.3.16)."""
-    tail = bytes(data[-(1 << 16) - 22 :])
-    at = tail.rfind(b"PK\x05\x06")
-    return max(0, len(tail) - at - 22 - int.from_bytes(tail[at + 20 : at + 22], "little")) if at >= 0 else 0
-
-
-def _unsafe(name: str) -> str | None:
-    """Return why a zip entry's name may not be a part's, or None."""
-    if name.startswith("/") or _SCHEME.match(name):
-        return "is absolute"
-    if "\\" in name:
-        return "has a backslash"
-    if any(ord(c) < 32 or ord(c) == 127 for c in name):
-        return "has a control character"
-    segments = (name[:-1] if name.endswith("/") else name).split("/")
-    decoded = [unquote(segment) for segment in segments]
-    if ".." in decoded:
-        return "climbs out of the package"
-    if any(not segment or segment.strip(".") == "" for segment in decoded):
-        return "has an empty segment"
-    if any(segment.endswith(".") for segment in decoded):
-        return "has a segment that ends with a dot"
-    if re.search(r"%(2f|5c)", name, re.IGNORECASE):
-        return "has an escaped slash"
-    return None
+def _unsafe(name: str) -> bool:
+    """Return whether a zip entry's name may not be a part's: it is not relative, climbs, or systems read it apart."""
+    segments = [unquote(segment) for segment in name.removesuffix("/").split("/")]
+    return bool(_ODD.search(name) or _SCHEME.match(name) or any(not part or part.endswith(".") for part in segments))
 
 
 def _content_types(package: Package) -> None:

@@ -6,7 +6,6 @@ Reaching a limit is finding F011, never a pass.
 from __future__ import annotations
 
 import contextlib
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -56,8 +55,8 @@ F005 = Rule("""
 
 F006 = Rule("""
     F006 warning: trailing bytes
-    Bytes follow the last facet, endsolid, the last element that a PLY or OFF promises, or a zip's end record. Readers
-    ignore them, or count facets from the size and disagree.
+    Bytes follow the last facet, endsolid, or the last element that a PLY or OFF promises. Readers ignore them, or count
+    facets from the size and disagree.
     Example: A binary STL has 16 bytes of a checksum after its last facet.
     Fix: Export again, or cut the file after its last facet.
 """)
@@ -123,12 +122,8 @@ F011 = Rule("""
     at each other, so it was not checked to its end. It never passes. Findings up to then are reported.
     Example: A mesh has 12 million faces, and --max-faces is 10 million.
     Fix: If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or
-    --memory, of which a file may take a quarter. Limits without an option, such as 4 GB a file and 100,000 instances of
-    a 3MF, are fixed.
+    --memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed.
 """)
-
-
-_FILE_SHARE = 0.25  # share of the memory: intermediate data of a file take several times its size
 
 
 @dataclass(frozen=True)
@@ -148,34 +143,10 @@ class Limits:
     ratio: float = 1000.0
     seconds: float = 600.0
 
-    def check_bytes(self, n: int) -> None:
-        """Raise `Unreadable` (F011) for a file of more bytes than `max_bytes`, or than a part of the memory."""
-        memory = _memory()
-        if n > self.max_bytes:
-            raise F011.unreadable(f"{n} bytes, more than the limit of {self.max_bytes}")
-        if memory is not None and n > memory * _FILE_SHARE:
-            raise F011.unreadable(
-                f"{n} bytes, more than a quarter of the {memory // 1_000_000} MB of memory (--memory)"
-            )
-
     def check_faces(self, n: int) -> None:
         """Raise `Unreadable` (F011) for more faces than `max_faces`."""
         if n > self.max_faces:
             raise F011.unreadable(f"{counted(n, 'face')}, more than --max-faces {self.max_faces}")
-
-
-def _memory() -> int | None:
-    """Return the bytes of memory that this process may have, or None if that is not known (Windows)."""
-    try:
-        import resource
-
-        limit, there = (
-            resource.getrlimit(resource.RLIMIT_AS)[0],
-            os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"),
-        )
-    except (ImportError, ValueError, OSError):
-        return None
-    return there if limit < 0 else min(limit, there)
 
 
 class OutOfTime(Unreadable):

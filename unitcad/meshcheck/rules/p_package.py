@@ -16,8 +16,8 @@ P001 = Rule("""
 P002 = Rule("""
     P002 error: relationships
     A .rels part is missing or malformed, repeats an Id, points to a part that is not there, or a part that the model
-    uses is not the target of a relationship. A thumbnail that is missing is a warning, unless --3mf-strict is given,
-    since PrusaSlicer writes such files.
+    uses is not the target of a relationship. A missing thumbnail of the package is a warning, unless --3mf-strict is
+    given, since PrusaSlicer writes such files.
     Example: _rels/.rels names /3D/3dmodel.model, and the package has 3D/model.model.
     Fix: List every used part once in the .rels of the part that uses it.
 """)
