@@ -354,7 +354,6 @@ def test_a_motion_is_a_displacement_over_j_omega(tmp_path, table, motor, um):
     ("table", "motor", "edge", "field", "words"),
     [
         (sensor("velocity", "mm/s", "scale = 50.0\n"), "V", "mV", "sensor.per", ("mV", "V")),
-        (sensor("velocity", "mm/s", "scale = 50.0\n"), "mA", "V", "sensor.per", ("mA", "V")),
         (sensor("velocity", "mm/s", "scale = 2.0\n"), "mm/s", "um/s", "sensor.scale", ("needs no scale",)),
         (VELOCITY, "um", "mm/s", "sensor.unit", ("um",)),
         (VELOCITY, "V", "V", "sensor.unit", ("V", "sensor.scale")),

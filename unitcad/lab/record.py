@@ -201,7 +201,7 @@ def _factor(sensor: SensorTable, own: str, shown: str) -> float:
     if sensor.scale == 1.0:
         limit = f"but {shown}, says {own}: declare sensor.scale and sensor.per, or another quantity"
         raise Refusal("sensor.unit", sensor.unit, limit)
-    if ratio(own, "V") != 1.0:
+    if ratio(own, "V") not in (None, 1.0):
         limit = f"is needed: {shown}, says {own}; is the scale per {own} or per V?"
         raise Refusal("sensor.per", None, limit, "V")
     return sensor.scale
