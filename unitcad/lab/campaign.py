@@ -35,12 +35,6 @@ class SensorTable(Table, frozen=True, kw_only=True):
     unit: Annotated[Name, Meta(description="unit of the samples after scale, such as mm/s")]
     scale: Annotated[Positive, Meta(description="unit per volt, or per the unit in per")] = 1.0
     per: Annotated[Name | None, Meta(description="unit of the numbers in the files; default: V, or no unit")] = None
-    full_scale: Annotated[
-        Positive | None,
-        Meta(
-            description="largest value that the sensor gives, in unit; default: unitcad finds clipping in the samples"
-        ),
-    ] = None
 
 
 class RecordingTable(Table, frozen=True, kw_only=True):

@@ -23,7 +23,7 @@ from unitcad.export.chart import Series, chart
 from unitcad.lab import measuring
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measuring import Measured
-from unitcad.lab.record import RULES, RecordResult
+from unitcad.lab.record import RecordResult
 from unitcad.spec.toml import text_of
 
 MEASURED = "measured.toml"
@@ -86,25 +86,12 @@ def as_data(result: Measured) -> dict[str, Any]:
 
 
 def lines(result: Measured) -> Iterator[str]:
-    """Yield the levels and the records as lines for a person."""
+    """Yield the levels as lines for a person."""
     for one in result.levels:
         value = f"{one.level.value:.3f} ({one.level.low:.3f} to {one.level.high:.3f})"
         yield (
             f"{one.unit}, {_place(one.distance_mm)}, {one.chain}: {value} of the motor's amplitude, "
             f"{one.frequency_hz:.1f} Hz"
-        )
-    for unit, r in _each_record(result):
-        if not r.frequency_hz:
-            why = ", ".join(f"{one.code} {RULES[one.code].title}" for one in r.findings if one.severity == "error")
-            yield f"  {unit}, {r.role}, {r.file}: not used, {why}"
-            continue
-        gain = "".join(f", filters of {name} pass {value:.3f}" for name, value in r.gains.items())
-        ratio = f", {r.ratio:.4f} of the motor" if r.ratio is not None else ""
-        size = f"{r.amplitude_um:.4g} +- {2 * r.u_um:.2g} um" if r.usable else f"not used, {r.amplitude_um:.4g} um"
-        yield (
-            f"  {unit}, {r.role}, {r.file}: {size}{ratio}, "
-            f"{r.frequency_hz:.2f} Hz over {r.steady_s:.3g} s of {r.length_s:.3g} s, "
-            f"drift {r.drift:.2%}, signal to noise {r.snr:.3g}{gain}"
         )
     for text in _assumed(result):
         yield f"  {text}"

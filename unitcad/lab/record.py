@@ -420,7 +420,7 @@ def _fits(
     """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
     fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
-        fit = fit_line(samples[:, i], rate, band, mains_hz, sensors[i].full_scale, fits[0] if fits else None)
+        fit = fit_line(samples[:, i], rate, band, mains_hz, fits[0] if fits else None)
         fits.insert(0, fit if fit and fit.amplitude > 0 else None)
     return fits
 
