@@ -88,9 +88,7 @@ class Bench:
         """Seconds of a batch, with a fresh cache if none is given."""
         self.count += 1
         self.last = self.scratch / f"out{self.count}"
-        options = BatchOptions(
-            self.only, cache=cache or self.scratch / f"cache{self.count}", cache_mb=1e6, folders=True
-        )
+        options = BatchOptions(self.only, cache=cache or self.scratch / f"cache{self.count}", cache_mb=1e6)
         with self._warm() as executor:
             start = time.perf_counter()
             summary = run(sweep, self.last, options, executor, workers=self.workers)
@@ -202,7 +200,7 @@ def costs(scratch: Path, variants: int) -> dict[str, Any]:
         run(
             sweep,
             scratch / out,
-            BatchOptions(only, cache=scratch / "cache", cache_mb=1e6, folders=True),
+            BatchOptions(only, cache=scratch / "cache", cache_mb=1e6),
             executor,
             workers=1,
         )

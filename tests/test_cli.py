@@ -12,7 +12,6 @@ from tests.in_process import unitcad as run
 from unitcad import cli
 from unitcad.casting.steps import duration
 from unitcad.cli import app
-from unitcad.export import slicer
 
 
 @pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
@@ -104,23 +103,6 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command):
 def test_help_and_version():
     assert "build" in run("--help").stdout
     assert run("--version").stdout.startswith("unitcad 0.")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--only", "estimate"], "--only = 'estimate': has no moulds, which --slice is for; nearest accepted"),
-        (["--formats", "3mf"], 'output.formats = ["3mf"]: has no stl, which --slice reads'),
-        (["--set", "moulds.printer=sla"], "moulds.printer = 'sla': prints no filament"),
-    ],
-)
-def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(words, said, tmp_path):
-    if slicer.program() is None:
-        said = "PrusaSlicer is not installed"
-    done = run("build", "embedded", "--slice", *words, cwd=tmp_path)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert not (tmp_path / "out").exists()
 
 
 def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path):

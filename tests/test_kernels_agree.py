@@ -1,4 +1,7 @@
-"""Four realisations of one tree: manifold3d and OCCT share no code, so that these two agree is evidence."""
+"""Four realisations of one tree: manifold3d and OCCT share no code, so that these two agree is evidence.
+
+The two libraries on OCCT draw it by operations of their own.
+"""
 
 import contextlib
 import importlib
@@ -52,8 +55,8 @@ def solids_of(shape):
     """The shape by every B-rep library that is installed (CI has both)."""
     found = {"occt": occt.solids([shape])[0]}
     for name in ("build123d", "cadquery"):
-        with contextlib.suppress(UnitcadError):
-            library = importlib.import_module(f"unitcad.kernels.{name}")
+        with contextlib.suppress(ImportError):
+            library = importlib.import_module(f"benchmarks.accuracy.{name}_kernel")
             found[name] = library.solid(shape).wrapped
     return found
 

@@ -62,8 +62,7 @@ def test_a_broken_installation_is_told_how_to_mend(name, error, installed, said)
     ("kernel", "fault"),
     [
         ("kernels.occt", ""),
-        ("kernels.build123d", "raise ImportError('another version')"),
-        ("kernels.cadquery", "raise AttributeError('gone')"),
+        ("kernels.native", "raise ImportError('another version')"),
         ("export.step", "raise AttributeError('gone')"),
     ],
 )
@@ -100,7 +99,7 @@ def test_show_uses_the_viewer_that_is_installed(monkeypatch):
     variant = unitcad.Variant.of("embedded")
     names = list(variant.bodies)
     installed = set()
-    monkeypatch.setattr("unitcad.kernels.build123d.find_spec", lambda name: name in installed or None)
+    monkeypatch.setattr("unitcad.kernels.native.find_spec", lambda name: name in installed or None)
     with pytest.raises(UnitcadError, match=r"no viewer is installed: .* install ocp-vscode"):
         variant.show()
     installed.add("yacv_server")

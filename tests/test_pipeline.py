@@ -39,7 +39,7 @@ def _tree(folder):
     return {
         str(f.relative_to(folder)): hashlib.sha256(f.read_bytes()).hexdigest()
         for f in sorted(folder.rglob("*"))
-        if f.is_file() and f.name not in ("timings.json", "slicer.json", "report.html")
+        if f.is_file() and f.name not in ("timings.json", "report.html")
     }
 
 

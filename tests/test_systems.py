@@ -10,8 +10,6 @@ import filelock
 import pytest
 
 from unitcad import files
-from unitcad.errors import UnitcadError
-from unitcad.export import slicer
 from unitcad.pipeline import plan as versions
 
 
@@ -89,27 +87,6 @@ def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path, monkeypat
 
     monkeypatch.setattr(versions, "Path", Windows)
     assert versions.code_version.__wrapped__() == here
-
-
-@pytest.mark.parametrize(
-    ("system", "on_path", "there", "found"),
-    [
-        ("linux", ["prusa-slicer"], [], "prusa-slicer"),
-        ("win32", ["prusa-slicer-console"], [], "prusa-slicer-console"),
-        ("darwin", ["PrusaSlicer"], [], "PrusaSlicer"),
-        ("darwin", [], [slicer.PLACES["darwin"][1]], slicer.PLACES["darwin"][1]),
-        ("win32", [], list(slicer.PLACES["win32"]), slicer.PLACES["win32"][0]),
-        ("linux", [], list(slicer.PLACES["darwin"]), None),
-        ("linux", [], [], None),
-    ],
-)
-def test_the_slicer_is_found_under_each_system_s_name(system, on_path, there, found, monkeypatch):
-    monkeypatch.setattr(slicer.sys, "platform", system)
-    monkeypatch.setattr(slicer.shutil, "which", lambda name: name if name in (*on_path, *there) else None)
-    assert slicer.program() == found
-    if found is None:
-        with pytest.raises(UnitcadError, match="not installed"):
-            slicer.needs_repair(Path("x.stl"))
 
 
 def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ from manifold3d import Manifold
 
 from tests.sample_bodies import LEADLESS
 from unitcad.checks import balance, draw, overlap
-from unitcad.checks.draw import blocked_area
+from unitcad.checks.draw import blocked
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
 from unitcad.moulds.mould_set import MouldSet
@@ -91,12 +91,13 @@ def test_a_mould_balances_and_nothing_overlaps_at_any_slant(slant, at):
 
 @settings(max_examples=10, deadline=None, phases=WITHOUT_SHRINKING)
 @given(SLANTS)
-def test_what_blocks_a_piece_along_its_own_axis_is_the_same_area_at_any_slant(slant):
+def test_what_blocks_a_piece_along_its_own_axis_is_the_same_volume_at_any_slant(slant):
     collar = moved(cylinder(8, 0, 0.5), z=3)
     for piece, area in ((INSERT, 0.0), (union((INSERT, collar)), math.pi * (8**2 - 7**2))):
         stays = cut(cylinder(9, -3, 20), [union((MOAT, piece))])
         one, other = (mesh.realise(placed(shape, slant, (0, 0)), SEGMENTS) for shape in (piece, stays))
-        assert blocked_area(one, other, axis_of(slant)) == pytest.approx(area, abs=1e-9)
+        met = sum(blocked(one, {"": other}, axis_of(slant)).values())
+        assert met == pytest.approx(area * (20 - 3.5), abs=1e-6)
 
 
 def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up():

@@ -9,7 +9,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
+from unitcad.attenuation.edge.estimates import Layered, estimate, rounded, rounded_layered
 from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
@@ -67,16 +67,6 @@ def _fit_file(spec: Spec) -> dict[str, Any]:
 def closed_forms(models: Sequence[str]) -> tuple[str, ...]:
     """Return the models of a list that are formulas: all but `fem`."""
     return tuple(model for model in models if model != FEM)
-
-
-def frequency_table_of_spec(
-    spec: Spec, frequencies_hz: Sequence[float], models: Sequence[str] | None = None
-) -> dict[str, Any]:
-    """Return a table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
-    variant = estimate_input(spec, frequencies_hz[0])
-    fit = fit_of(spec)
-    data = frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models), fit)
-    return {**data, "fit": {**_fit_file(spec), "name": fit.name}} if fit else data
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:

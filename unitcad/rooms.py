@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -62,7 +62,6 @@ class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
 class _Room(Struct, frozen=True, forbid_unknown_fields=True):
     commands: dict[str, Command] = field(default_factory=dict)
     files: tuple[FileKind, ...] = ()
-    stored_spec: str = ""
 
 
 @cache
@@ -81,11 +80,6 @@ def load(reference: str) -> Any:
 def commands() -> dict[str, Command]:
     """Return the commands of the command line by name."""
     return {name: command for room in _rooms() for name, command in room.commands.items()}
-
-
-def stored_spec() -> Callable[[Path, str], str] | None:
-    """Return the function that reads a variant's spec in a batch's store, from the batch's folder and the variant's."""
-    return next((load(room.stored_spec) for room in _rooms() if room.stored_spec), None)
 
 
 def file_kinds() -> tuple[FileKind, ...]:

@@ -14,9 +14,9 @@ import numpy as np
 from benchmarks.accuracy import ball_reference
 from benchmarks.accuracy.hankel import DISC, OMEGA, RADII
 from benchmarks.accuracy.journal import journalled
-from benchmarks.accuracy.outcomes import in_order
-from benchmarks.accuracy.random_media import CLASSES, Trial, trial
 from benchmarks.accuracy.result import Cell, Plot, Promise, Table, shown
+from unitcad.accuracy.random_media import CLASSES, Trial, trial
+from unitcad.accuracy.survey import in_order
 from unitcad.attenuation.layered import Damping, HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor
 from unitcad.errors import UnitcadError
 

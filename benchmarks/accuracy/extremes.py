@@ -10,10 +10,10 @@ from typing import Any
 
 from benchmarks.accuracy.journal import journalled
 from benchmarks.accuracy.machine import machine
-from benchmarks.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, in_order, outcome
-from benchmarks.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table
 from unitcad.accuracy.measurements import timing
+from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
+from unitcad.accuracy.survey import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, in_order, outcome
 from unitcad.designs import estimated_designs
 from unitcad.validation import default_template, override, read
 

@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.accuracy import build123d_kernel, cadquery_kernel
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.measures import mesh_volume
-from benchmarks.accuracy.random_specs import seeded_spec
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.measurements import interleaved, timing
+from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.designs import shipped
 from unitcad.errors import Refusal
-from unitcad.kernels import bounds, build123d, cadquery, mesh, occt
+from unitcad.kernels import bounds, mesh, occt
 from unitcad.kernels.occt import Measures
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
@@ -120,8 +121,8 @@ def _makers(shapes: Sequence[Shape], segments: int) -> dict[str, Callable[[], li
     """Return the kernels by name, each from trees to OCCT bodies or manifold3d solids."""
     return {
         "OCCT": lambda: occt.solids(shapes),
-        "build123d": lambda: [build123d.solid(shape).wrapped for shape in shapes],
-        "CadQuery": lambda: [cadquery.solid(shape).wrapped for shape in shapes],
+        "build123d": lambda: [build123d_kernel.solid(shape).wrapped for shape in shapes],
+        "CadQuery": lambda: [cadquery_kernel.solid(shape).wrapped for shape in shapes],
         "manifold3d": lambda: [mesh.realise(shape, segments) for shape in shapes],
     }
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import count
 
 from benchmarks.accuracy.machine import machine
-from benchmarks.accuracy.random_specs import seeded_spec
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.measurements import timing
+from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.cache import MemoryStore
 from unitcad.checks import mould_checks
 from unitcad.errors import Refusal

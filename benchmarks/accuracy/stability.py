@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.accuracy import extreme_responses, thomson_haskell
 from benchmarks.accuracy.machine import machine
-from benchmarks.accuracy.random_media import CLASSES
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
+from unitcad.accuracy.random_media import CLASSES
 from unitcad.attenuation.layered import (
     Damping,
     HalfSpace,

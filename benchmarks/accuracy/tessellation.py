@@ -232,18 +232,18 @@ def _rows(shape: Shape, radius: float, tolerances: tuple[float, ...], repeats: i
 
 
 def _methods(shape: Shape, radius: float, tolerance: float) -> dict[str, Callable[[], Mesh]]:
-    from unitcad.kernels import build123d, cadquery
+    from benchmarks.accuracy import build123d_kernel, cadquery_kernel
 
     def by_manifold(segments: int, swell: float | None = None) -> Mesh:
         mesh.forget()
         return mesh.arrays(mesh.realise(shape, segments, swell))
 
     def by_build123d() -> Mesh:
-        points, faces = build123d.solid(shape).tessellate(tolerance, ANGLE)
+        points, faces = build123d_kernel.solid(shape).tessellate(tolerance, ANGLE)
         return np.array([tuple(point) for point in points]), np.array(faces)
 
     def by_cadquery() -> Mesh:
-        points, faces = cadquery.solid(shape).tessellate(tolerance, ANGLE)
+        points, faces = cadquery_kernel.solid(shape).tessellate(tolerance, ANGLE)
         return np.array([point.toTuple() for point in points]), np.array(faces)
 
     return {

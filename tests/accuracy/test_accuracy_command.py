@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -10,8 +11,10 @@ import pytest
 from msgspec.structs import replace as changed_struct
 
 from tests.in_process import unitcad
+from unitcad.accuracy import survey
 from unitcad.accuracy.amplification import amplifications, extremes
 from unitcad.accuracy.measurements import (
+    REFERENCE,
     RTOLS,
     compare,
     interleaved,
@@ -21,7 +24,7 @@ from unitcad.accuracy.measurements import (
     tolerances_of,
 )
 from unitcad.attenuation.inputs import Quantity
-from unitcad.attenuation.layered import Response
+from unitcad.attenuation.layered import LayeredMedium, Response
 from unitcad.estimate_inputs import estimate_input
 from unitcad.kernels.mesh import area_true
 from unitcad.pipeline.make import Subject
@@ -149,14 +152,51 @@ def test_an_array_is_measured_as_it_is_cast(monkeypatch):
     assert triangles == sorted(triangles)
 
 
-@pytest.mark.parametrize("part", ["mesh_rows", "response_rows"])
-def test_an_error_above_its_bound_is_exit_code_1(part, rows, monkeypatch):
-    mesh_row = {"tolerance_mm": 0.1, "distance_mm": None, "triangles": 12, "within_bounds": part != "mesh_rows"}
-    over = [{**rows[0], "over_bound": 1.2 if part == "response_rows" else 0.9}]
-    found = {"mesh_rows": [mesh_row], "response_rows": over, "amplifications": [], "skipped_rows": []}
-    for name, made in found.items():
-        monkeypatch.setattr(f"unitcad.accuracy.accuracy_command.{name}", lambda *_, made=made: made)
-    assert unitcad("accuracy", "encapsulating", "--json").returncode == 1
+def test_a_survey_repeats_by_its_seed_and_names_what_is_worst():
+    first, again, other = (survey.survey_media(2, seed, lambda stage: None) for seed in (0, 0, 1))
+    errors = [[row["error"] for row in found["by_rtol"]] for found in (first, again, other)]
+    assert errors[0] == errors[1] != errors[2]
+    assert sum(row["bounds_broken"] for row in first["by_class"]) == 0
+    worst = first["worst"]
+    assert worst["over_bound"] == max(row["over_bound"] for row in first["by_rtol"])
+    assert (worst["class"], worst["seed"]) in {("ordinary", 0), ("film on the forearm", 0)}
+
+
+def test_a_response_off_by_more_than_its_bound_is_exit_code_1(monkeypatch):
+    exact = LayeredMedium.response
+
+    def off(*arguments, rtol, **keywords):
+        found = exact(*arguments, rtol=rtol, **keywords)
+        return replace(found, u_z=found.u_z * 1.2) if rtol > REFERENCE else found
+
+    monkeypatch.setattr(LayeredMedium, "response", off)
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.survey_specs", lambda *_: {"by_ranges": [], "faults": []})
+    done = unitcad("accuracy", "--media", "1", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["media"]["by_rtol"][4]["bounds_broken"] == 1
+
+
+def test_a_spec_that_is_neither_built_nor_refused_is_exit_code_1(monkeypatch):
+    monkeypatch.setattr(survey, "outcome", lambda data: survey.Outcome("crash", "KeyError: 'x'"))
+    found = survey.survey_specs(4, 2, lambda stage: None)
+    assert [row["faults"] for row in found["by_ranges"]] == [3, 1]
+    assert found["faults"][3] == {"ranges": "extreme", "seed": 200_000, "kind": "crash", "message": "KeyError: 'x'"}
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.survey_media", lambda *_: {"by_rtol": [], "by_class": []})
+    done = unitcad("accuracy", "--specs", "2", "--json")
+    assert done.returncode == 1
+    assert "fault: extreme 0: crash: KeyError: 'x'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (["encapsulating", "--media", "9"], "--media"),
+        (["encapsulating", "--seed", "9"], "--seed"),
+        (["--set", "diameter_mm=15"], "--set"),
+    ],
+)
+def test_options_of_the_survey_are_refused_for_a_spec(words, field):
+    assert f"error: {field}" in unitcad("accuracy", *words).stderr
 
 
 def test_the_command_shows_every_part(rows, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.ball_reference import response
-from benchmarks.accuracy.random_media import trial
+from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import KelvinVoigt, LossFactor, UniformDisc
 

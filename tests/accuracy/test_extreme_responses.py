@@ -7,7 +7,7 @@ from benchmarks.accuracy import extreme_responses
 from benchmarks.accuracy.ball_reference import TooHard
 from benchmarks.accuracy.extreme_responses import Row, promises, rows
 from benchmarks.accuracy.hankel import DISC, RADII
-from benchmarks.accuracy.random_media import CLASSES, Trial, trial
+from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import Point, UniformDisc
 from unitcad.errors import UnitcadError

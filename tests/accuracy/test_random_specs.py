@@ -5,15 +5,15 @@ from pathlib import Path
 import pytest
 
 from benchmarks.accuracy import extremes
-from benchmarks.accuracy.outcomes import (
+from benchmarks.accuracy.runner import JOURNALS
+from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec, seeded_spec
+from unitcad.accuracy.survey import (
     BUILT,
     REFUSED,
     Outcome,
     put_in,
     refusal_of,
 )
-from benchmarks.accuracy.random_specs import DOCUMENTED, Seeded, random_spec, seeded_spec
-from benchmarks.accuracy.runner import JOURNALS
 from unitcad.checks import check_moulds
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.hankel import DISC, RADII, cases
-from benchmarks.accuracy.random_media import trial
+from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import LossFactor, UniformDisc
 

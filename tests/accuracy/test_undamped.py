@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.random_media import trial
+from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, LayeredMedium
 from unitcad.attenuation.layered import UniformDisc
 

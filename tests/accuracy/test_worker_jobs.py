@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from benchmarks.accuracy import outcomes
-from benchmarks.accuracy.outcomes import in_order
+from unitcad.accuracy import survey
+from unitcad.accuracy.survey import in_order
 
 PATIENCE = 0.3
 
@@ -31,7 +31,7 @@ def test_a_job_that_gets_little_of_the_processor_is_no_hung_one():
 
 
 def test_a_job_that_waits_for_ever_ends_by_the_clock(monkeypatch):
-    monkeypatch.setattr(outcomes, "_WAITING", 1)
+    monkeypatch.setattr(survey, "_WAITING", 1)
     assert list(in_order(time.sleep, [100.0], 0.1, lambda job: f"late: {job}")) == ["late: 100.0"]
 
 

@@ -36,8 +36,8 @@ def test_a_cup_goes_on_the_pins_in_one_attitude_only():
 
 # Units at -20, 0, 20; cup 1: bore 5.75, groove 6.75 to 8.25; cup 2: groove from 31 to 32.5 at y, pins at y = 35.45.
 FAULTS = [
-    ("C230", "cup1", "a pin's hole into a groove", less(moved(cylinder(2.15, -1, 2.5), 0, 7.5))),
-    ("C230", "cup2", "a pin's hole into the groove", less(moved(cylinder(2.15, -1, 3.7), 10, 31.75))),
+    ("C000", "cup1", "a pin's hole into a groove", less(moved(cylinder(2.15, -1, 2.5), 0, 7.5))),
+    ("C000", "cup2", "a pin's hole into the groove", less(moved(cylinder(2.15, -1, 3.7), 10, 31.75))),
     ("C240", "cup2", "a pin's hole 0.5 from a bore", less(moved(cylinder(2.15, -1, 2.4), 0, 29.6))),
     ("C210", "base", "a pin 0.1 too thick", more(moved(cylinder(2.1, 0, 1.5), 23.2, -35.45))),
     ("C210", "base", "a fin 0.1 too wide", more(box(-15, -12.5, -1.8, 1.8, 0, 2.11))),

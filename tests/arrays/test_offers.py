@@ -12,11 +12,6 @@ from unitcad.moulds.mould_set import MouldSet
 
 _SHEET = {"array": "back-sheet", "unit": "encapsulating"}
 _HEX = {**_SHEET, "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20}}
-_SMALL_BED = {
-    **_SHEET,
-    "layout": {"kind": "grid", "columns": 5, "rows": 4, "pitch_mm": 19},
-    "moulds": {"bed_x_mm": 90, "bed_y_mm": 90},
-}
 _POINTS = {**_SHEET, "unit": "embedded", "layout": {"kind": "list", "points_mm": [[0, 0], [20, 0], [10, 40]]}}
 _RESIN = {"moulds.printer": "sla"}
 
@@ -48,7 +43,7 @@ def test_what_can_not_be_cast_is_refused_with_what_would(name, changes, field):
     refused = refusal_of(name, changes)
     assert refused.field == field
     assert patch_moulds(load_array(name, {**changes, field: refused.nearest})).plan
-    if changes == {"moulds.bed_x_mm": 60}:
+    if changes == {"moulds.bed_x_mm": 40}:
         assert "silicone" in str(refused), "what the seams would take up"
 
 
@@ -63,12 +58,11 @@ REFUSED = [
     ("sleeve-curved", {"unit": "embedded"}, "unit.design", "encapsulating"),
     ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
     ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
-    # Base and cups each ask for another bed where they are cut one by one; a tenth less is refused.
-    *(("forearm-patch", {"moulds.bed_x_mm": bed}, "moulds.bed_x_mm", 58.9) for bed in (10, 58.8)),
+    ("forearm-patch", {"moulds.bed_x_mm": 10}, "moulds.bed_x_mm", 56.4),
     ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.7),
-    ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 370),
-    ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 740),
-    ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 715),
+    ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 52.82),
+    ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 210.3),
+    ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 202.39),
     ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", 263.395),
 ]
 
@@ -92,7 +86,6 @@ def named(limit, before, after):
     [
         (_HEX, {}, "circuit.row_width_mm", {"circuit.corner_mm"}),
         (_POINTS, {}, "unit.design", {"unit.layers.0.cap_mm", "unit.layers.1.cap_mm", "circuit.rows"}),
-        (_SMALL_BED, {}, "moulds.bed_x_mm", set()),
     ],
 )
 def test_the_value_offered_is_accepted_with_what_it_also_needs(data, changes, field, also):
@@ -102,23 +95,6 @@ def test_the_value_offered_is_accepted_with_what_it_also_needs(data, changes, fi
     more = named(refused.limit, "also needs", "then") if also else {}
     assert set(more) == also
     assert patch_moulds(load_array(source, {**changes, field: refused.nearest, **more})).plan
-
-
-@pytest.mark.parametrize(
-    ("source", "changes", "words"),
-    [
-        ({"name": "hex", **_HEX}, {}, {"layout.pitch_mm": 22.0}),
-        ({"name": "small", **_SMALL_BED}, {}, {"layout.columns": 3}),
-        ("forearm-patch", _RESIN, {"layout.pitch_mm": 18.0, "sheet.strap_slot_mm.1": 21.0}),
-        ("sleeve-curved", {"moulds.bed_x_mm": 60}, {"layout.columns": 2}),
-    ],
-)
-def test_a_bed_or_circuit_too_small_names_the_layout_that_fits(source, changes, words):
-    refused = refusal_of(source, changes)
-    found = named(refused.limit, "(?:on this bed|with this circuit)", "would do")
-    assert found == words
-    for path, value in found.items():
-        assert patch_moulds(load_array(source, {**changes, path: value})).plan
 
 
 def test_a_plate_that_fits_turned_by_a_quarter_says_so():
@@ -139,9 +115,9 @@ def test_another_unit_in_a_back_sheet_is_named():
 def test_the_pitch_offered_is_the_nearest_that_needs_nothing_else(name, tail):
     refused = refusal_of(name, {"layout.pitch_mm": 12})
     assert refused.nearest == 18
-    assert f"layout.pitch_mm = 16 would also need unit.fpcb.tail_length_mm = {tail}" in refused.limit
+    assert "at 16, unit.fpcb.tail_length_mm = 10: the tail of" in refused.limit
+    assert f"at most {tail} mm" in refused.limit
     assert load_array(name, {"layout.pitch_mm": 18})
-    assert load_array(name, {"layout.pitch_mm": 16, "unit.fpcb.tail_length_mm": tail})
     assert refusal_of(name, {"layout.pitch_mm": 17.9}).field == "unit.fpcb.tail_length_mm"
 
 
@@ -159,19 +135,14 @@ def test_where_no_pitch_does_alone_the_combination_is_offered():
 @pytest.mark.parametrize("name", ["forearm-pockets", "hex-19"])
 def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name, pitch):
     refused = refusal_of(name, {"layout.pitch_mm": pitch})
-    assert (refused.field, refused.limit.partition(";")[0], refused.file) == (
-        "layout.pitch_mm",
-        "must be at least 1",
-        None,
-    )
+    assert (refused.field, refused.file) == ("layout.pitch_mm", None)
+    assert refused.limit.startswith("must be at least 1")
 
 
-@pytest.mark.parametrize(("unit", "tail", "pitch"), [("three-layer", 5.6, 21), ("pass-through", 7.1, 21.7)])
-def test_a_tail_too_long_is_told_the_length_and_the_pitch(unit, tail, pitch):
+@pytest.mark.parametrize(("unit", "tail"), [("three-layer", 5.6), ("pass-through", 7.1)])
+def test_a_tail_too_long_is_told_the_length(unit, tail):
     refused = refusal_of("hex-19", {"unit": unit})
     assert (refused.field, refused.nearest) == ("unit.fpcb.tail_length_mm", tail)
-    assert f"with layout.pitch_mm = {pitch} it is accepted as it is" in refused.limit
-    assert load_array("hex-19", {"unit": unit, "layout.pitch_mm": pitch})
     assert load_array("hex-19", {"unit": unit, "unit.fpcb.tail_length_mm": tail})
 
 
@@ -189,7 +160,7 @@ def test_an_angle_at_which_a_tail_runs_into_a_unit_is_told_the_nearest_free_one(
 
 
 def test_the_name_that_was_meant_is_offered_before_another_one():
-    limit, nearest = "unknown name; closest: pockets; then its units are held with their own circuits", "pockets"
+    limit, nearest = "unknown name; closest: pockets, and its units are held with their own circuits", "pockets"
     with pytest.raises(Refusal) as refused:
         load_array("forearm-patch", {"array": "pocket"})
     assert (refused.value.limit.partition("; [")[0], refused.value.nearest) == (limit, nearest)

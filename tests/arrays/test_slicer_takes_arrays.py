@@ -1,19 +1,17 @@
 """PrusaSlicer slices every piece of every tool of every shipped array, and repairs none of them."""
 
+import prusa
 import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.figures import FDM_ERROR, print_min
-from unitcad.export import printing, slicer
+from unitcad.export import printing
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
 from unitcad.spec import printer_of
 
-pytestmark = [
-    pytest.mark.slicer,
-    pytest.mark.skipif(slicer.program() is None, reason="PrusaSlicer is not installed"),
-]
+pytestmark = prusa.MARKS
 
 
 SLOW = ("sleeve-curved", "wrist-band")
@@ -29,10 +27,10 @@ def test_every_tool_of_an_array_is_sliced(name, tmp_path):
             continue
         path = tmp_path / f"{tool.name}.stl"
         path.write_bytes(printing.stl(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name))
-        assert not slicer.needs_repair(path), tool.name
-        sliced = slicer.slice_file(path, printer_of(moulds.spec))
-        assert sliced.print_s > 60, tool.name
-        taken += sliced.print_s / 60
+        assert not prusa.needs_repair(path), tool.name
+        minutes = prusa.print_minutes(path, printer_of(moulds.spec), path.with_suffix(".gcode"))
+        assert minutes > 1, tool.name
+        taken += minutes
     solid = sum(moulds.mesh(tool).volume() for tool in moulds.plan.pieces if tool.made == "printed")
     low, high = FDM_ERROR
     assert low <= taken / print_min(moulds.spec, solid, 0.0) <= high

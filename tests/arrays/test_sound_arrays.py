@@ -23,11 +23,10 @@ SHIPPED = [
     # Round strap slots.
     *((name, slot, "layout.columns=2", "layout.rows=1")
       for name, slot in ((PATCH, "sheet.strap_slot_mm=[3,3]"), (POCKETS, "sheet.strap_slot_mm=[3,2]"))),
-    # Tools larger than the bed, along x, along y and along both.
+    # Tools larger than the bed, along x and along y.
     ("wrist-band",),
     pytest.param((PATCH, "moulds.bed_x_mm=60"), marks=pytest.mark.long),
     ("hex-19", "moulds.bed_y_mm=80"),
-    ("hex-19", "layout.rings=3", "moulds.bed_x_mm=110", "moulds.bed_y_mm=100"),
     (POCKETS, "layout.columns=12", "layout.rows=1", "sheet.strap_slot_mm=[3,8]"),
     (POCKETS,),
     ("hex-19",),
@@ -70,11 +69,6 @@ LONG = {
     # A seam's tooth and a notch's window stop the groove between them: a slit of 0.031 mm stayed beside a tape's.
     "tape": tape("motor-10mm", 10, 25),
     "tape of larger units": tape("encapsulating", 12, 23),
-    "x and y": {
-        **BACK_SHEET,
-        "layout": {"kind": "grid", "columns": 2, "rows": 2, "pitch_mm": 110},
-        "moulds": {"bed_x_mm": 140, "bed_y_mm": 140},
-    },
     "curved hex": {
         **BACK_SHEET,
         "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20},

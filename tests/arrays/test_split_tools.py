@@ -10,7 +10,7 @@ from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import mould_checks
 from unitcad.errors import Refusal
-from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams, split, straight
+from unitcad.moulds.cuts import Feature, Seam, Sized, Tooth, in_gaps, seams, split
 from unitcad.pipeline.plan import file_stem
 from unitcad.shape import Common, box, cut, moved, union
 
@@ -75,8 +75,8 @@ def test_too_many_seams_weep_too_much():
     """Six seams in place of one: what they hold is more than a hundredth of the layer."""
     plan = band().plan
     sound = plan.splits[-1].seams[0]
-    teeth = [(sound.teeth[0].middle[1] - 5, sound.teeth[0].middle[1] + 5)]
-    many = split(plan.tool("cup2"), [straight(-15.0 + 10 * i, teeth, sound.play) for i in range(6)])
+    drawn = [Seam(x, x, (Tooth(x, sound.teeth[0].y),), sound.play) for x in range(-15, 45, 10)]
+    many = split(plan.tool("cup2"), drawn)
     faulty = replace(plan, splits=(*plan.splits[:-1], many))
     found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if "silicone" in f.where]
     assert [f.ok for f in found] == [True, False]
@@ -86,8 +86,8 @@ def cut_at(bed):
     """Cut a tool 220 mm long, a feature 12 mm wide every 20 mm."""
     corners = ((-6.0, -30), (6.0, -30), (6.0, 30), (-6.0, 30))
     features = tuple(Feature(tuple((x + dx, y) for dx, y in corners)) for x in range(-100, 101, 20))
-    sized = Sized("x", (-110, 110), bed, (-30, 30), features, (tuple(in_gaps((-110, 110), features)),))
-    return [seam.at for seam in seams([sized], "it", 0.15)]
+    sized = Sized("x", (-110, 110), bed, (in_gaps((-110, 110), features, (-30, 30), features, 0.15),))
+    return [seam.at for seam in seams(sized, "it")]
 
 
 def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least():

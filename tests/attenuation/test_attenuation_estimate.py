@@ -17,9 +17,8 @@ from unitcad.attenuation.edge.estimates import summary
 from unitcad.attenuation.edge.level import corners
 from unitcad.attenuation.edge.models import edge_levels
 from unitcad.cli import app
-from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal
-from unitcad.estimate_inputs import estimate_input, estimate_spec, frequency_table_of_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
 
 SOFT, MEDIUM, STIFF = "ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"
@@ -195,18 +194,6 @@ def _floats(data):
         yield from _floats(one)
 
 
-def test_frequency_as_typed():
-    assert frequencies("120") == [120]
-    assert frequencies("100:150:25") == [100, 125, 150]
-    assert frequencies("1.1:1.3:0.1") == pytest.approx([1.1, 1.2, 1.3])
-    nearest = {"1e9": "5000", "0.5": "1", "0.1:9000:100": "1:5000:100"}
-    for text in ("", "0", "-1", "a", "1:2", "1:2:0", "2:1:1", "1:2:nan", "1:1e9:1", *nearest):
-        with pytest.raises(Refusal) as refused:
-            frequencies(text)
-        assert refused.value.field == "--frequency"
-        assert refused.value.nearest == nearest.get(text, refused.value.nearest)
-
-
 def run(*arguments):
     return CliRunner().invoke(app, ["estimate", *arguments])
 
@@ -219,8 +206,6 @@ def test_command_as_json():
     assert found["variant"]["frequency_hz"]["value"] == 110
     two = json.loads(run("encapsulating", "embedded", "--json", "--set", "layers.0.wall_mm=1.3").stdout)
     assert [one["variant"]["layers"][0]["wall_mm"] for one in two["estimates"]] == [1.3, 1.3]
-    table = json.loads(run("embedded", "--frequency", "100:120:10", "--json").stdout)
-    assert [row["frequency_hz"] for row in table["frequencies"]] == [100, 110, 120]
 
 
 def test_the_tables_of_a_person(monkeypatch):
@@ -229,20 +214,7 @@ def test_the_tables_of_a_person(monkeypatch):
     assert shown.count("error against the table") == 1
     assert shown.index("chosen among") > shown.index("embedded: embedded")
     assert shown.index("|u| of the skin") < shown.index("change of the edge level")
-    table = run("encapsulating", "--frequency", "100:150:50").stdout
-    for word in ("corrected", "flat", "axial", "mm from the edge", "edge level, %"):
-        assert word in " ".join(table.split())
-    assert "…" not in table + shown
-
-
-def test_a_table_over_frequencies_has_both_drives():
-    for drive in ("flat", "axial"):
-        row = frequency_table_of_spec(load("encapsulating", [f"motor.drive={drive}"]), [125.0])["frequencies"][0]
-        assert row["u_over_edge"] == row[f"{drive}_over_edge"]
-        curve = estimate_spec(load("encapsulating"), ("divider",), 125.0)["layered"]
-        at = curve["r_mm"].index(10.0)
-        expected = curve["drives"][drive]["u"]["value"][at]
-        assert row[f"{drive}_over_edge"]["at_10_mm"] == pytest.approx(expected, rel=5e-3)
+    assert "…" not in shown
 
 
 @pytest.mark.parametrize("model", ["crossings", "layered", "baseline"])
@@ -251,12 +223,6 @@ def test_a_model_that_gives_no_estimate_is_refused_with_those_that_do(model):
     assert isinstance(refused, Refusal)
     for name in ("rule", "divider", "published", "corrected", "fem", "all"):
         assert name in refused.limit
-
-
-@pytest.mark.parametrize(("hertz", "said"), [([50.0, 100.0], (None, 50, 100)), ([60.0], (60, 60, 60))])
-def test_a_table_over_frequencies_says_which(hertz, said):
-    found = frequency_table_of_spec(load("encapsulating"), hertz, ("divider",))["variant"]["frequency_hz"]
-    assert (found["value"], found["low"], found["high"]) == said
 
 
 def test_a_range_stays_a_range_in_the_papers_details():

@@ -18,7 +18,7 @@ from unitcad.attenuation.edge.measured import measured_table, nominal
 from unitcad.attenuation.edge.models import COMPARED, assess_all, stored
 from unitcad.attenuation.edge.ranges import predictive_of, unit_key
 from unitcad.errors import Refusal
-from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of
 from unitcad.files import sha256
 from unitcad.lab.fit_command import contents, fit_toml, leads_text, sections
 from unitcad.lab.fitting import fit_lab, load_fit_lab
@@ -398,11 +398,6 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file, t
     assert data["fit"]["leads"] == data["answer"]["model"] == "rule"
     assert [own["value"] for own in data["own_measured"]] == [0.098]
     assert estimate_spec(load(spec, {"layers.0.wall_mm": 1.3}))["own_measured"] == []
-    table = frequency_table_of_spec(spec, [100.0])
-    assert table["fit"] == {key: data["fit"][key] for key in ("file", "sha256", "name")}
-    assert table["frequencies"][0]["edge_level"]["rule"]["value"] == pytest.approx(
-        data["models"]["rule"]["edge_level"]["value"]
-    )
 
 
 @pytest.fixture

@@ -48,14 +48,13 @@ def ply(
     return "\n".join(head).encode() + body
 
 
-def obj(points, faces, *, negative=False, form="{}", wrapped=False):
-    """An OBJ; `form` writes an index, `wrapped` continues each face on further lines."""
+def obj(points, faces, *, negative=False, form="{}"):
+    """An OBJ; `form` writes an index."""
     rows = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in points]
-    space = " \\\n  " if wrapped else " "
     lines = ["# made for a test", "mtllib a.mtl", "vt 0 0", "vn 0 0 1", *rows]
     for face in faces:
         names = [form.format(i - len(points) if negative else i + 1) for i in face]
-        lines.append("f" + space + space.join(names))
+        lines.append(f"f {' '.join(names)}")
     return "\n".join([*lines, ""]).encode()
 
 
@@ -77,7 +76,7 @@ def every_way(points, faces):
         made[f"{said}-extra.ply"] = ply(points, faces, order, extra=True, count="int", index="ushort")
     made["single.ply"] = ply(points, faces, "<", coordinate="float", count="ushort", index="uint32")
     made |= {"plain.obj": obj(points, faces), "back.obj": obj(points, faces, negative=True)}
-    made["wrapped.obj"] = obj(points, faces, wrapped=True, form="{0}//1")
+    made["slashes.obj"] = obj(points, faces, form="{0}//1")
     made["full.obj"] = obj(points, faces, form="{0}/1/1")
     made |= {f"{kind}plain.off": off(points, faces, kind=kind) for kind in ("", "C", "N", "STCN")}
     made["noted.off"] = off(points, faces, colors=True, comments=True)

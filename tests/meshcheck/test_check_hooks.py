@@ -191,7 +191,6 @@ def test_the_settings_on_the_page_are_settings(tmp_path, monkeypatch):
         assert found.ignored("scans/a.stl")
         if name == "unitcad.toml":  # it shows every key there is
             assert all(value is not None for value in structs.asdict(found.settings).values())
-            (tmp_path / "known.json").write_text('{"unitcad-baseline": 1, "files": {}}')
             (tmp_path / "part.stl").write_bytes(stl(box()))
             assert run("part.stl", cwd=tmp_path).returncode == 0
 

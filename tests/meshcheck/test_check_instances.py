@@ -68,8 +68,8 @@ def test_depth_is_counted_over_what_was_visited_before(judge):
     for items, code in ((("41", "60"), None), (("41", "81"), "P009"), (("81",), "P009")):
         built = "".join(f'<item objectid="{item}"/>' for item in items)
         content = package(model_xml(f'<object id="1">{mesh_xml()}</object>{chain}', f"<build>{built}</build>"))
-        report = judge(content, "a.3mf", cross=False)
-        assert [found.code for found in report.findings] == ([code] if code else []), items
+        report = judge(content, "a.3mf")
+        assert [found.code for found in report.findings if found.code != "G002"] == ([code] if code else []), items
 
 
 def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_place_on_the_bed(judge, monkeypatch):
@@ -82,9 +82,7 @@ def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_pla
     def findings(of):
         content = package(model_xml(f'<object id="1">{thin}</object>', build=build(of)))
         return {
-            item.code: item
-            for item in judge(content, "a.3mf", printer="fdm-0.4", cross=False).findings
-            if item.code.startswith("D")
+            item.code: item for item in judge(content, "a.3mf", printer="fdm-0.4").findings if item.code.startswith("D")
         }
 
     single = [findings([matrix]) for matrix in matrices]
@@ -105,6 +103,6 @@ def test_many_instances_of_one_object_are_cheap(judge):
     spread = [np.vstack([eye, [20.0 * (i % 100), 20.0 * (i // 100), 0]]) for i in range(20_000)]
     content = package(model_xml(build=build(spread)))
     begin = time.process_time()
-    report = judge(content, "a.3mf", cross=False)
+    report = judge(content, "a.3mf")
     assert time.process_time() - begin < 3  # 0.9 s on two cores at 2.5 GHz; 4 s when each instance is measured
     assert report.facts.shells == 20_000

@@ -10,11 +10,11 @@ def packed(model, more, *relations):
 
 def test_places_and_messages_keep_the_case(judge):
     model = model_xml(f'<object id="1" odd="1">{mesh_xml()}</object>')
-    report = judge(packed(model, {"Metadata/Thumb.png": b"no image"}, (THUMBNAIL, "/metadata/thumb.PNG")), "a.3mf")
+    report = judge(packed(model, {"Metadata/Thumb.gif": b""}, (THUMBNAIL, "/metadata/thumb.GIF")), "a.3mf")
     said = {found.code: found for found in report.findings}
     assert said["P017"].locations[0].part == "3D/Part_A.model"
-    assert said["P020"].locations[0].part == "Metadata/Thumb.png"
-    assert "Metadata/Thumb.png" in said["P020"].message
+    assert said["P001"].locations[0].part == "Metadata/Thumb.gif"
+    assert "Metadata/Thumb.gif" in said["P001"].message
 
 
 def test_a_part_that_is_missing_is_named_as_it_was_asked_for(judge):

@@ -46,8 +46,6 @@ LINEAR  = {
     "solids": ("a.stl", lambda n: f"solid a\n{FACET}endsolid a\n".encode() * n),
     "materials": ("a.obj", lambda n: CUBE + b"usemtl a\nf 1 2 3\n" * n),
     "objects": ("a.obj", lambda n: CUBE + b"o a\nf 1 2 3\n" * n),
-    "continued lines": ("a.obj", lambda n: CUBE + b"f 1 \\\n 2 \\\n 3\n" * n),
-    "one continued line": ("a.obj", lambda n: CUBE + b"f 1 2 3" + b" \\\n 1" * n),
     "blank lines": ("a.obj", lambda n: b"\n \n\t" * n + CUBE),
     "slashes": ("a.obj", lambda n: CUBE + b"f " + b"/" * 9 * n),
     "comments": ("a.off", lambda n: b"OFF\n" + b"# # #\n" * n + b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),

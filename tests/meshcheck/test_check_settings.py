@@ -135,7 +135,6 @@ BAD = [
     ("[chekc]\nselect = []", "unitcad.toml: chekc = { select = [] }: unknown key; ", "'check'"),
     ("select = ['T']", "unitcad.toml: select = [\"T\"]: unknown key; known here: check", ""),
     ("[check\n", "unitcad.toml:1:7: not TOML: ", ""),
-    ("[check]\nbaseline = 'none.json'", "none.json: no such file", ""),
 ]  # fmt: skip
 
 

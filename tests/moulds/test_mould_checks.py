@@ -114,9 +114,9 @@ FAULTS = [
     ("C220", "cup2", "a rib of 0.05 more", more(box(-9.9, -9.45, 3.5, 3.7, -1.3, -0.6))),
     ("C220", "base", "plinth 0.05 narrower at +x", less(box(9.45, 10.5, -99, 99, -1.9, 1))),
     ("C220", "cup1", "a rib up to the seat", more(box(9.45, 9.9, 3.4, 3.8, -0.9, 0))),
-    ("C230", "cup1", "a pin's hole into the groove", less(moved(cylinder(2.0, -3, 2.5), 0, 7.5))),
-    ("C230", "cup1", "a pin's hole 0.5 under the groove", less(moved(cylinder(0.5, -3, 1.86), 0, 7.5))),
-    ("C230", "cup2", "a slot beside the groove", less(box(-2, 2, 9.9, 10.5, 2.0, 9))),
+    ("C000", "cup1", "a pin's hole into the groove", less(moved(cylinder(2.0, -3, 2.5), 0, 7.5))),
+    ("C240", "cup1", "a pin's hole 0.5 under the groove", less(moved(cylinder(0.5, -3, 1.86), 0, 7.5))),
+    ("C240", "cup2", "a slot beside the groove", less(box(-2, 2, 9.9, 10.5, 2.0, 9))),
     ("C240", "cup1", "a hole 0.5 from the bore", less(moved(cylinder(0.3, 0.5, 2.5), -6.55, 0))),
     ("C240", "cup2", "a hole 0.6 from the groove", less(moved(cylinder(0.3, 3.5, 9), -10.4, 0))),
     ("C250", "base", "larger than the bed", more(box(-120, 120, -5, 5, -4, -3))),
@@ -245,7 +245,7 @@ def test_air_under_a_tongue_is_the_formulas():
 
 @pytest.mark.parametrize("height", [1.0, 1.033, 1.1, 1.2, 1.3, 1.39, 1.5, 1.61])
 def test_walls_of_a_low_cup_are_whole(height):
-    """Letters as deep as the overflow groove: 0.4 mm at 1.03 mm, where letters 0.63 mm off the groove broke C230.
+    """Letters as deep as the overflow groove: 0.4 mm at 1.03 mm, where letters 0.63 mm off the groove were too near.
 
     At 1.2 mm the groove's floor is 0.6 mm thick, which broke C240.
     """
@@ -257,5 +257,5 @@ def test_walls_of_a_low_cup_are_whole(height):
         "layers": [{"material": "ecoflex-00-10", "wall_mm": 0.5}],
     }
     findings = check_moulds(MouldSet(from_data(data)))
-    assert {"C230", "C240"} <= {finding.code for finding in findings}
+    assert "C240" in {finding.code for finding in findings}
     assert [finding for finding in findings if not finding.ok] == []

@@ -112,15 +112,3 @@ def test_two_thousand_rows_come_in_pages(browser, tmp_path):
     assert "page 1 of 7" in seen.page.inner_text(".variants")
     assert "2000 failed" in seen.page.inner_text("header")
     seen.close()
-
-
-@pytest.mark.parametrize(("folder", "word"), [("many", "many"), ("Ann's rings", "'Ann'\\''s rings'")])
-def test_a_row_without_a_folder_says_how_to_make_it(browser, tmp_path, folder, word):
-    page = table_page(tmp_path, ["name"], [["ring-0123456789ab", "ring"], ["", "failed"]], stored_in=folder)
-    visit = Visit(browser, page)
-    note = visit.page.locator(".lacking")
-    assert note.inner_text() == ""
-    visit.page.click(".variants tbody a")
-    visit.page.wait_for_function("() => document.querySelector('.lacking').textContent")
-    assert f"unitcad export 0123456789ab --batch {word} && unitcad report {word}" in note.inner_text()
-    visit.close()

@@ -144,7 +144,6 @@ KINDS = {
     "estimate.json is torn": (_torn("estimate.json"), True),
     "estimate.json is of wrong types": (_written("estimate.json", '{"models": [5], "layered": {"r_mm": "x"}}'), True),
     "casting.json is of wrong types": (_written("casting.json", '{"pours": 7, "bill": {"a": 1}}'), True),
-    "slicer.json is of wrong types": (_written("slicer.json", '{"pieces": [{"file": 5}]}'), True),
     "spec.toml has code": (_code, True),
     "spec.toml is torn": (_torn("spec.toml"), True),
     "names hold markup": (_said("manifest.json", name=SCRIPT, label=SCRIPT, warnings=[SCRIPT], design=SCRIPT), True),

@@ -156,12 +156,3 @@ def check_file_is_refused(command, capsys, monkeypatch):
     code, _, err = _run(command, capsys, monkeypatch)
     assert code == 2, err
     assert all(line.startswith("error: ") for line in err.splitlines()), err
-
-
-def test_every_frequency_step_that_is_offered_is_accepted():
-    from unitcad.cli.estimate_command import frequencies
-
-    for text in ("1:5000:5e-324", "1:5000:0.001", "100:100.5:1e-9", "99.7:4999.3:1", "0.5:10:1", "10:5:1"):
-        with pytest.raises(Refusal) as refused:
-            frequencies(text)
-        assert 1 <= len(frequencies(str(refused.value.nearest))) <= 1000

@@ -147,7 +147,7 @@ def test_a_link_planted_in_a_results_place_is_not_written_through(tmp_path):
     folder = build(spec, tmp_path, only=["estimate"]).folder
     target = tmp_path / "target"
     target.write_text("keep")
-    for name in ("report.html", "timings.json", f".tmp-report.html-{os.getpid()}", ".tmp-slicer.json"):
+    for name in ("report.html", "timings.json", f".tmp-report.html-{os.getpid()}"):
         (folder / name).unlink(missing_ok=True)
         (folder / name).symlink_to(target)
     build(spec, tmp_path, only=["estimate"])

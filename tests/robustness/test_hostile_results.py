@@ -20,7 +20,6 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as P
 SHOWN_IN_BROWSER = [
     "estimate.json is of wrong types",
     "casting.json is of wrong types",
-    "slicer.json is of wrong types",
     "names hold markup",
     "names hold half characters",
     "drawings hold scripts",

@@ -5,15 +5,15 @@ import pytest
 pytest.importorskip("starlette", reason="the extra serve is not installed")
 pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
-from running import TOKEN, serving
+from running import serving
 
 from unitcad.validation import templates
 
 
 @pytest.fixture(scope="session")
 def server(tmp_path_factory):
-    """A server of the default template, whose token is TOKEN."""
-    with serving(tmp_path_factory.mktemp("served"), environment={"UNITCAD_TOKEN": TOKEN}) as running:
+    """A server of the default template."""
+    with serving(tmp_path_factory.mktemp("served")) as running:
         yield running
 
 

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -14,11 +13,7 @@ import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import uvicorn
-
 MESSAGE = {"Content-Type": "application/json"}
-TOKEN = "a-token-of-the-lab"
-"""What UNITCAD_TOKEN says where a test has to know the token."""
 
 
 class Server:
@@ -87,35 +82,12 @@ def apart(coroutine):
         return pool.submit(asyncio.run, coroutine).result()
 
 
-def against(app, http, client, **settings):
-    """Run a client, given what connects it, against an app whose connections are of the class `http`."""
-
-    async def both():
-        listening = socket.create_server(("127.0.0.1", 0), backlog=200)
-        address = listening.getsockname()
-        config = uvicorn.Config(app, http=http, ws="none", lifespan="off", log_level="critical", **settings)
-        server = uvicorn.Server(config)
-        running = asyncio.create_task(server.serve(sockets=[listening]))
-        while not server.started:
-            await asyncio.sleep(0.01)
-        with contextlib.ExitStack() as lines:
-            try:
-                await asyncio.to_thread(
-                    client, lambda: lines.enter_context(socket.create_connection(address, timeout=20.0))
-                )
-            finally:
-                server.should_exit = True
-                await running
-
-    apart(both())
-
-
 @contextlib.contextmanager
-def serving(folder, *arguments, environment=None):
-    """Run `unitcad serve` in a folder, without a browser unless asked for, with variables added to the environment."""
+def serving(folder, *arguments):
+    """Run `unitcad serve` in a folder, without a browser unless asked for."""
     command = [sys.executable, "-P", "-m", "unitcad", "serve", "--no-browser", *arguments]
-    pipe, given = subprocess.PIPE, {**os.environ, **(environment or {})}
-    with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True, env=given) as process:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True) as process:
         try:
             yield Server(process.stdout.readline().strip(), process, folder)
         finally:

@@ -9,7 +9,6 @@ from running import serving
 
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.write import build
-from unitcad.report.page import page_data
 from unitcad.sweeps import BatchOptions, run
 from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.sweep import from_file
@@ -48,25 +47,6 @@ def test_a_row_of_a_batch_opens_live(browser, own):
         assert visit.page.evaluate("() => document.activeElement.id") == "spec"
     assert sorted(opened) == ["1", "1.5"]
     visit.close()
-
-
-def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(browser, tmp_path):
-    base = {"base": "single-embedded", "set": {"output.formats": []}}
-    sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "walls")
-    options = BatchOptions(("unit",), check=False, folders=False)
-    run(sweep, tmp_path / "walls", options, SerialExecutor(), workers=1)
-    assert not list((tmp_path / "walls").glob("single-*"))
-    with serving(tmp_path, str(tmp_path / "walls")) as own:
-        folder = next(row[0] for row in page_data(tmp_path / "walls", modelled=None)[0]["table"]["rows"])
-        for wrong in ("single-embedded-000000000000", f"other-{folder[-12:]}", folder[-12:-1], "-"):
-            assert own.send(f"/variant/{wrong}")[0] == 404
-        visit = Live(browser, own)
-        # The page begins with the batch's first variant.
-        assert visit.page.input_value('input[name="name"]') == "single-embedded-wall1"
-        assert visit.page.input_value(WALL) == "1"
-        visit.page.locator("#variants tbody th a").nth(1).click()
-        visit.until(lambda: visit.page.input_value(WALL) == "1.5")
-        visit.close()
 
 
 def test_a_refused_row_opens_with_its_values_and_its_refusal(browser, tmp_path):

@@ -5,7 +5,7 @@ import json
 import os
 
 import pytest
-from running import TOKEN, serving
+from running import serving
 
 from tests.in_process import unitcad
 from unitcad.serve.access_keys import AccessKeys
@@ -63,11 +63,11 @@ def status(server, head, body=b""):
 
 
 def test_odd_addresses_and_headers_are_no_fault_of_the_server(own):
-    key = AccessKeys(TOKEN).address("x.json").partition("/")[0]
+    key = AccessKeys(own.token).address("x.json").partition("/")[0]
     targets = [(route + path, "") for route, path in itertools.product(READ, PATHS)]
     targets += [(route + query, "") for route, query in itertools.product(READ, QUERIES)]
     targets += [(route, header) for route, header in itertools.product(READ, HEADERS)]
-    for (target, header), token in itertools.product(targets, ("", f"X-Unitcad-Token: {TOKEN}\r\n")):
+    for (target, header), token in itertools.product(targets, ("", f"X-Unitcad-Token: {own.token}\r\n")):
         lines = f"{header}\r\n" if header else ""
         address = target.replace("{key}", key)
         head = f"GET {address} HTTP/1.1\r\nHost: 127.0.0.1:{own.port}\r\nConnection: close\r\n{token}{lines}\r\n"

@@ -11,19 +11,7 @@ from running import serving
 from unitcad.arrays.array_file import array_templates
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.serve.server import serve
-from unitcad.validation import custom_templates
-
-
-@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
-def test_another_address_needs_a_token(host):
-    with pytest.raises(WrongArgument, match="loopback"):
-        serve(None, host=host)
-
-
-@pytest.mark.parametrize("token", ["short", "has a space in it now", "é" * 20])
-def test_a_token_can_not_be_guessed(token):
-    with pytest.raises(WrongArgument, match="16 printable"):
-        serve(None, token=token)
+from unitcad.validation import custom_templates, templates
 
 
 def test_a_design_that_is_code_needs_a_word(tmp_path):
@@ -87,3 +75,14 @@ def test_a_question_under_way_does_not_hold_up_the_end(tmp_path):
         time.sleep(1.0)
     asking.join(20)
     assert answers == [500]
+
+
+def test_a_folder_of_specs_opens_its_only_one_or_names_them(tmp_path):
+    text = templates()["embedded"].read_text("utf-8")
+    (tmp_path / "settings.toml").write_text("colour = 1")
+    (tmp_path / "one.toml").write_text(text)
+    with serving(tmp_path, ".") as own:
+        assert b"one.toml" in own.send("/")[1]
+    (tmp_path / "two.toml").write_text(text)
+    with pytest.raises(UnitcadError, match=r"one.toml, two.toml: give one of them"):
+        serve(str(tmp_path))

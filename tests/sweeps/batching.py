@@ -128,11 +128,11 @@ def environment():
 
 def bytes_of(out):
     """Everything in a batch's folder that is promised to be the same from run to run."""
-    apart = ("timings.json", "journal.jsonl", "batch.lock", "store.json")
+    apart = ("timings.json", "journal.jsonl", "batch.lock")
     return {
         str(file.relative_to(out)): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(out.rglob("*"))
-        if file.is_file() and file.name not in apart and out / "store" not in file.parents
+        if file.is_file() and file.name not in apart
     }
 
 

@@ -1,7 +1,6 @@
 """The cache: once each, by many at once; damage found and mended; links, copies where links fail; collecting."""
 
 import errno
-import json
 import multiprocessing
 import os
 import shutil
@@ -177,21 +176,6 @@ def test_a_folder_of_others_is_refused(tmp_path):
     with pytest.raises(UnitcadError, match="no cache"):
         collect(tmp_path / "mine", 0)
     assert (tmp_path / "mine" / "letter.txt").read_text() == "keep"
-
-
-def test_a_bundle_spares_the_work_but_not_the_content(tmp_path):
-    first = MemoryStore()
-    sha = first.file("ab1", Made())
-    data_of(first, "ab2", lambda: {"files": [sha]})
-    bundle = first.bundle()
-    assert json.dumps(vars(bundle))
-    second = MemoryStore(bundle)
-    assert second.file("ab1", lambda: pytest.fail("known")) == sha
-    assert (
-        data_of(second, "ab2", lambda: pytest.fail("known"), intact=lambda d: all(map(second.has, d["files"])))
-        is not None
-    )
-    assert second.contents == {}
 
 
 def _replaced(path, kind, outside):

@@ -62,10 +62,7 @@ COMMANDS = {
     "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",
     "estimate unit.toml --model pubished": "--model = 'pubished': unknown name; closest: published; "
     "nearest accepted: 'published'",
-    "estimate unit.toml --frequency 125hz": "--frequency = '125hz': must be HZ or FROM:TO:STEP, numbers above 0; "
-    "nearest accepted: '125'",
-    "estimate unit.toml --frequency 100-200": "--frequency = '100-200': must be HZ or FROM:TO:STEP, numbers above 0; "
-    "nearest accepted: '100:200:10'",
+    "estimate unit.toml --frequency 125hz": "--frequency = '125hz': takes a number (HZ), such as 1",
     "check part.csv --select TT": "--select = 'TT': unknown code; unitcad list rules lists all",
     "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
     "check parts.csv": "FILE = 'parts.csv': no such file; closest: part.csv",

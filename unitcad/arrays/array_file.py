@@ -23,7 +23,6 @@ from unitcad.arrays.circuit import outline
 from unitcad.arrays.constructions import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
-from unitcad.arrays.offers import suggest_for_array
 from unitcad.arrays.sheet import middle_radius, sheet_of
 from unitcad.arrays.tails import Blocked, angles, length_field, tail_length
 from unitcad.designs.limits import up
@@ -40,7 +39,7 @@ from unitcad.text import join_words
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.load import named_file, override, shipped_files
 from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, put
-from unitcad.validation.suggestions import every_fault, numbers
+from unitcad.validation.suggestions import Judge, every_fault, numbers, suggest_value
 
 
 def array_templates() -> dict[str, Path]:
@@ -212,7 +211,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
         every = every_fault(first, whole, partial(array_of, lay_tails=lay_tails), sound)
         if len(every) == 1:
             judge = makeable_array if lay_tails else partial(array_of, lay_tails=False)
-            every = [suggest_for_array(first, whole, judge, sound)]
+            every = [suggest_for_array(first, whole, judge)]
         if path:
             for one in every:
                 _locate(one, path, data, written, whole)
@@ -241,6 +240,31 @@ def plan_tools(array: Array) -> Plan:
     if not way.own_tails:
         outline(array)
     return made
+
+
+MOST_TRIED = 2_000
+"""Places of all arrays together that are tried for one suggestion: a try takes some milliseconds a place."""
+
+
+def suggest_for_array(refusal: Refusal, data: Mapping[str, Any], judge: Judge = makeable_array) -> Refusal:
+    """Return the refusal of an array's plain data with a value that was tried and accepted, if one is found."""
+    if type(refusal) is not Refusal or (refusal.value is None and refusal.nearest is None):
+        return refusal
+    left = MOST_TRIED
+
+    def tried(changed: dict[str, Any]) -> object:
+        nonlocal left
+        keys = "columns", "rows", "count", "bands", "rings", "rings"
+        counts = (at(changed, f"layout.{key}") for key in keys)
+        left -= max(1, math.prod(count for count in counts if isinstance(count, int)))
+        if left < 0:
+            raise Refusal("", None, "not tried")
+        return judge(changed)
+
+    better = suggest_value(refusal, data, tried, sound_array(data))
+    if isinstance(refusal.nearest, str) and isinstance(better.nearest, str):
+        better.nearest = refusal.nearest  # the word that was meant, not another one
+    return better
 
 
 def _locate(

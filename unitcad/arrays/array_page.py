@@ -122,7 +122,7 @@ def tools_model(array: Array) -> dict[str, Any]:
     }
 
 
-CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
+CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg"), "circuit.svg"
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
 SIDES = ("skin-side", "bent", "back")
@@ -133,7 +133,6 @@ WORDS = {
     "tools.png": "Tools and cast silicone, taken apart",
     "crosstalk-patch.svg": "Vibration at each unit from all others, on the patch",
     "crosstalk.svg": "Crosstalk from each unit (row) to each other one (column)",
-    "crosstalk-edge.svg": "The same, at the nearest edge of the other unit",
     "circuit.svg": "Outline of the circuit, pads and rows",
 }
 ARRAY_FILE = "array.toml"
@@ -316,26 +315,12 @@ def _places(array: Mapping[str, Any]) -> str:
         [p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), p["unit"].rpartition("/")[2]] for p in array["places"]
     ]
     if array["construction"] == "pockets":
-        covered = {tail["place"]: tail for tail in array.get("covered_tails", [])}
         note += " The angle is that of the tail, counter-clockwise from x."
         head += ["tail's angle, degrees", "tail's end"]
         for row, place in zip(rows, array["places"], strict=True):
-            row += [number(place["angle_deg"], 4), _tail_end(covered.get(place["name"]))]
+            under = place["name"] in array.get("covered_tails", [])
+            row += [number(place["angle_deg"], 4), "under the sheet: solder wires on" if under else "free"]
     return f'<p class="note">{note}</p>' + _table(head, rows)
-
-
-def _tail_end(covered: Mapping[str, Any] | None) -> str:
-    """Return the end of a tail in words: under the sheet it has to be made longer, or wires soldered on."""
-    if covered is None:
-        return "not under the sheet"
-    blocked, turn = covered["blocked_by"], covered.get("angle_deg")
-    longer = f"{covered['field']} = {number(covered['length_mm'])} reaches the edge"
-    if turn is not None:
-        blocked, longer = "", f"with angle_deg = {number(turn)} it comes out"
-    return (
-        f"under the sheet, {number(covered['short_mm'], 2)} mm before its edge along the tail: "
-        f"{f'{blocked} is in the way: solder wires on' if blocked else f'{longer}, or solder wires on'}"
-    )
 
 
 def _checks(manifest: ArrayManifest) -> str:

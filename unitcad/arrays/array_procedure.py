@@ -15,7 +15,7 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
-from unitcad.arrays.tails import covered_tails, longer_tails, where_they_end
+from unitcad.arrays.tails import covered_tails, named
 from unitcad.casting.bill import Item, bill, list_consumables, list_pieces, motor_name, mould_plates
 from unitcad.casting.figures import (
     LAY_IN_MIN,
@@ -332,8 +332,7 @@ def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str,
 def _wires(array: Array) -> Iterator[Item]:
     """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
     if covered := covered_tails(array):
-        longest = number(max(tail.short_mm for tail in covered), 2)
-        note = f"thin and insulated, two for each tail that ends under the sheet, at least {longest} mm and a connector"
+        note = "thin and insulated, two for each tail that ends under the sheet"
         yield Item("lead wire", 2 * len(covered), "piece", "bought", note)
 
 
@@ -545,10 +544,9 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
     if covered := covered_tails(array):
         yield BenchStep(
             "Wires on covered tails",
-            f"{counted(len(covered), 'tail')} would end under the sheet, {where_they_end(covered)}. Nothing can be "
-            "joined to them once the units are in. Solder wires to the end of each now, longer than this way by the "
-            "connector's length, and try the motor again. They leave between sheet and skin. Longer tails need none "
-            f"if the way is free. {longer_tails(covered)}",
+            f"{counted(len(covered), 'tail')} would end under the sheet, at {named(covered)}. Nothing can be joined to "
+            "them once the units are in. Solder wires to the end of each now, long enough to reach beyond the sheet, "
+            "and try the motor again. They leave between sheet and skin.",
             minutes=SOLDER_MIN * len(covered),
             required_tools=("soldering iron and solder",),
         )

@@ -26,8 +26,7 @@ from unitcad.arrays.array_file import (
     array_of,
     expand,
     load_array,
-    makeable_array,
-    sound_array,
+    suggest_for_array,
     to_toml,
     with_formats,
 )
@@ -36,7 +35,6 @@ from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.circuit import crowded_tracks
 from unitcad.arrays.crosstalk import extras
 from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
-from unitcad.arrays.offers import suggest_for_array
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
@@ -105,7 +103,7 @@ class Arrayed(Compound):
 
     @classmethod
     def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        return suggest_for_array(refusal, data, makeable_array, sound_array(data))
+        return suggest_for_array(refusal, data)
 
     @classmethod
     def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:
@@ -116,7 +114,7 @@ class Arrayed(Compound):
         cls,
         names: Sequence[str],
         sets: Sequence[str],
-        hertz: Sequence[float],
+        hertz: float | None,
         details: bool,
         as_json: bool,
     ) -> None:
@@ -327,7 +325,7 @@ def _record(array: Array, folders: list[str]) -> dict[str, Any]:
             }
             for p in array.places
         ],
-        "covered_tails": [asdict(tail) for tail in covered_tails(array)],
+        "covered_tails": list(covered_tails(array)),
     }
 
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from html import escape
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
-from unitcad.attenuation.curve import RANGE, Reading, contact, decay, ends
+from unitcad.attenuation.curve import RANGE, contact, decay, ends
 from unitcad.attenuation.inputs import Drive
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
@@ -25,7 +25,6 @@ from unitcad.export.chart import coord
 from unitcad.shape import Profile
 from unitcad.text import join_words, number
 
-BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 DRIVES: tuple[Drive, ...] = ("flat", "axial")
 _SUMS = ("sum", "root_sum_of_squares")
 _ENDS = {"low": "p10", "high": "p90"}
@@ -35,8 +34,7 @@ ASSUMPTIONS = [
     "the circuit are not on it. With each unit as a mass on its disc of skin, sums of three shipped arrays were 7 to "
     "20 % higher.",
     "A flat motor's force turns in the plane of the skin: |u| is then alike at every angle, and needs no direction.",
-    "|u| is the root of the sum of the squares of the three components' amplitudes. `axial_u_z` is only |u_z| under "
-    "an axial drive, which some print.",
+    "|u| is the root of the sum of the squares of the three components' amplitudes.",
     "Sums are in one unit's level at its edge, as if every unit were driven to that level.",
 ]
 
@@ -82,22 +80,20 @@ class Decays:
         drivers: np.ndarray,
         distances: np.ndarray,
         drive: Drive | None = None,
-        hertz: float | None = None,
         end: dict[str, int] | None = None,
-        reading: Reading = "u",
     ) -> np.ndarray:
         """Return |u| at distances (mm, (k, ...)) from the units of numbers `drivers`, (k,), over that at their edges.
 
-        `drive`, `hertz`: else each unit's own.
+        `drive`: default: each unit's own.
         """
         found = np.zeros(distances.shape)
         for kind, one in enumerate(self.inputs):
             rows = self.kind[drivers] == kind
             if np.any(rows):
-                found[rows] = decay(one, 1e-3 * distances[rows], drive, hertz, end, reading)
+                found[rows] = decay(one, 1e-3 * distances[rows], drive, end=end)
         return found
 
-    def both(self, drive: Drive, hertz: float | None = None, reading: Reading = "u") -> np.ndarray:
+    def both(self, drive: Drive) -> np.ndarray:
         """Return the decays to the centre and to the nearest edge, shape (n, n, 2), rows the unit that drives.
 
         0 for itself.
@@ -105,16 +101,11 @@ class Decays:
         away = np.stack([self.centre, self.edge], axis=-1)
         found = np.zeros(away.shape)
         drivers, moved = np.nonzero(~np.eye(len(self.kind), dtype=bool))
-        found[drivers, moved] = self.decays(drivers, away[drivers, moved], drive, hertz, reading=reading)
+        found[drivers, moved] = self.decays(drivers, away[drivers, moved], drive)
         return found
 
     def answer(
-        self,
-        nearest: tuple[int, int] | None,
-        worst: int,
-        drive: Drive | None = None,
-        hertz: float | None = None,
-        end: dict[str, int] | None = None,
+        self, nearest: tuple[int, int] | None, worst: int, end: dict[str, int] | None = None
     ) -> dict[str, np.ndarray]:
         """Return the decay between the `nearest` two units, to centre and edge, and the sums at the place `worst`.
 
@@ -125,9 +116,9 @@ class Decays:
         others = np.delete(np.arange(len(self.kind)), worst)
         away = np.append(self.centre[others, worst], [self.centre[nearest], self.edge[nearest]])
         drivers = np.append(others, [nearest[0], nearest[0]])
-        found = self.decays(drivers, away, drive, hertz, end)
+        found = self.decays(drivers, away, end=end)
         own = [self.inputs[kind] for kind in self.kind[drivers]]
-        factors = [contact(drive or one.drive, mm - 500.0 * one.diameter) for one, mm in zip(own, away, strict=True)]
+        factors = [contact(one.drive, mm - 500.0 * one.diameter) for one, mm in zip(own, away, strict=True)]
         found = found * np.concatenate([np.ones((1, found.size)), np.array(factors).T])
         return {
             "nearest_centre": found[:, -2],
@@ -137,16 +128,11 @@ class Decays:
         }
 
 
-def crosstalk(
-    array: Array,
-    band: Sequence[float] = BAND_HZ,
-    say: Callable[[str], None] = lambda line: None,
-) -> dict[str, Any]:
+def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> dict[str, Any]:
     """Return an array's crosstalk as JSON-ready data.
 
     `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
-    edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `band`: the same at the
-    nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range.
+    edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `absolute`: a range.
 
     Raises Refusal for a unit without an estimate, and for a frequency out of range.
     """
@@ -157,7 +143,6 @@ def crosstalk(
     sums = {
         "own_drive": _sums(own[..., 0]),
         **{drive: _sums(one[..., 0]) for drive, one in matrices.items()},
-        "axial_u_z": _sums(units.both("axial", reading="u_z")[..., 0]),
     }
     nearest, worst = _nearest(units, own), int(np.argmax(np.round(sums["own_drive"]["sum"], 9)))
     say("crosstalk: range")
@@ -200,19 +185,6 @@ def crosstalk(
         },
         "assumptions": ASSUMPTIONS,
     }
-    say("crosstalk: band")
-    data["band"] = [
-        {
-            "frequency_hz": hertz,
-            **{
-                drive: {
-                    key: round(float(one[0]), DIGITS) for key, one in units.answer(nearest, worst, drive, hertz).items()
-                }
-                for drive in DRIVES
-            },
-        }
-        for hertz in band
-    ]
     data["absolute"] = _absolute(units, own[..., 0], worst, ranged)
     return {**data, "answer": crosstalk_lines(data)}
 
@@ -286,17 +258,15 @@ def crosstalk_csv(array: Array) -> bytes:
     """Return a CSV file: `from` drives, `to` is moved; distances along the skin in mm, from the middle of `from`.
 
     The other columns are |u| over that at the edge of `from`, to the `centre` and the nearest `edge` of `to`, by drive,
-    at `frequency_hz` and then at each frequency of the band. Raises Refusal as `crosstalk`.
+    at `frequency_hz`. Raises Refusal as `crosstalk`.
     """
     units = Decays(array)
     apart = ~np.eye(len(units.kind), dtype=bool)
     table = {"distance_mm": np.round(units.centre[apart], 4), "edge_mm": np.round(units.edge[apart], 4)}
     table["frequency_hz"] = np.array([one.frequency.middle for one in units.inputs])[units.kind[np.nonzero(apart)[0]]]
-    for hertz in (None, *BAND_HZ):
-        suffix = "" if hertz is None else f"_{hertz:g}hz"
-        for drive in DRIVES:
-            both = np.round(units.both(drive, hertz)[apart], DIGITS)
-            table |= {f"{drive}_centre{suffix}": both[:, 0], f"{drive}_edge{suffix}": both[:, 1]}
+    for drive in DRIVES:
+        both = np.round(units.both(drive)[apart], DIGITS)
+        table |= {f"{drive}_centre": both[:, 0], f"{drive}_edge": both[:, 1]}
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("from", "to", *table))
@@ -321,7 +291,7 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
     nearest, worst = data["nearest"], data["worst"]
     if nearest is None:
         return ["A single unit has no neighbour: there is no crosstalk."]
-    lines = [
+    return [
         f"{_percent(nearest['centre'])} of a unit's motion at its edge reaches the middle of its nearest neighbour "
         f"({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
         f"and {_percent(nearest['nearest_edge'])} the neighbour's edge.",
@@ -329,10 +299,8 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
         f"unit's edge level if the motors are not synchronous (root of the sum of squares), and "
         f"{_times(worst['sum'])} times if all are in phase.",
         _absolute_line(data["absolute"]),
+        IN_BRACKETS,
     ]
-    if data["band"]:
-        lines.append(_band(data))
-    return [*lines, IN_BRACKETS]
 
 
 def _most(data: Crosstalk) -> str:
@@ -411,23 +379,6 @@ def _absolute_line(block: Mapping[str, Any]) -> str:
     )
 
 
-def _band(data: Crosstalk) -> str:
-    """Say how the nearest neighbour's share goes over the band under the drive of most units."""
-    drives = [place["drive"] for place in data["places"]]
-    drive = max(("flat", "axial"), key=drives.count)
-    shares = [(row["frequency_hz"], row[drive]["nearest_centre"]) for row in data["band"]]
-    ordered = sorted(shares, key=lambda pair: pair[1])
-    least, most = ordered[0], ordered[-1]
-    said = (
-        f"between {number(100 * least[1], 2)} % at {number(least[0])} Hz and {number(100 * most[1], 2)} % at "
-        f"{number(most[0])} Hz"
-    )
-    falls = len(shares) > 1 and all(a[1] >= b[1] for a, b in pairwise(shares))
-    said = f"falls from {number(100 * most[1], 2)} to {number(100 * least[1], 2)} %" if falls else f"is {said}"
-    whole = f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz"
-    return f"{whole} the nearest neighbour's share {said} ({drive} drive)."
-
-
 STEPS = 21
 _LIGHT, _DARK = (247, 251, 255), (8, 64, 129)
 _INK = "#111111"
@@ -440,22 +391,21 @@ _PAGE = 640.0
 _SCALE_PX = 90.0
 
 
-def heat_map_svg(data: Crosstalk, target: str = "centre") -> str:
-    """Return the matrix of `crosstalk` by each unit's own drive as an SVG document, in per cent.
+def heat_map_svg(data: Crosstalk) -> str:
+    """Return the matrix of `crosstalk` to the middles, by each unit's own drive, as an SVG document, in per cent.
 
-    A row is a unit that vibrates, a column one that it reaches. `target`: "centre" or "nearest_edge".
+    A row is a unit that vibrates, a column one that it reaches.
     """
     places = data["places"]
     names = [place["name"] for place in places]
-    matrix = [data["matrix"][place["drive"]][target][i] for i, place in enumerate(places)]
+    matrix = [data["matrix"][place["drive"]]["centre"][i] for i, place in enumerate(places)]
     n = len(names)
     cell = min(56.0, max(2.0, _PAGE / n))
     left, top = (64.0, 74.0) if n <= _MOST_NAMES else (34.0, 60.0)
     high = _largest(value for row in matrix for value in row if value is not None)
     wide, tall = max(left + n * cell + _SCALE_PX, 470.0), top + n * cell + 20.0
-    part = {"centre": "the middle", "nearest_edge": "the nearest edge"}[target]
     driven = " and ".join(sorted({place["drive"] for place in places}))
-    head = f"{data['array']}: how much of a unit's motion at its edge reaches {part} of another, % ({driven} drive)"
+    head = f"{data['array']}: how much of a unit's motion at its edge reaches the middle of another, % ({driven} drive)"
     parts = [_open(wide, tall), _text(8, 20, head, 12, "start")]
     parts += _cells(matrix, left, top, cell, high)
     for i, name in enumerate(names if n <= _MOST_NAMES else ()):
@@ -607,7 +557,6 @@ def crosstalk_files(array: Array) -> dict[str, bytes]:
         CROSSTALK: (json.dumps(data, indent=1, allow_nan=False) + "\n").encode(),
         "crosstalk.csv": crosstalk_csv(array),
         "crosstalk.svg": heat_map_svg(data).encode(),
-        "crosstalk-edge.svg": heat_map_svg(data, "nearest_edge").encode(),
         "crosstalk-patch.svg": patch_map_svg(array, data, circuit).encode(),
     }
 

@@ -14,7 +14,7 @@ from rich.text import Text
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions import construction_of
-from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, DRIVES, crosstalk, ratio_line, ratios
+from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_command import assumed_line, checks_line, to_open
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress
@@ -60,17 +60,16 @@ _HOW = "root of the sum of squares, or sum in phase"
 
 
 def estimate_arrays(
-    names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], details: bool, as_json: bool
+    names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool
 ) -> None:
-    """Print the crosstalk of arrays and, of several, each over the first. `hertz`: one frequency, or a band."""
+    """Print the crosstalk of arrays and, of several, each over the first."""
     for name in names:
         if not compound_kind(name):
             raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
-    own = [f"estimate.frequency_hz={hertz[0]!r}"] if len(hertz) == 1 else []
+    own = [f"estimate.frequency_hz={hertz!r}"] if hertz else []
     arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]
-    band = hertz if len(hertz) > 1 else () if hertz else BAND_HZ
     with progress("crosstalk") as stage:
-        every = [crosstalk(array, band, say=stage) for array in arrays]
+        every = [crosstalk(array, stage) for array in arrays]
     compared = ratios(every)
     if as_json:
         print_json(every[0] if len(every) == 1 else {"arrays": every, "ratios": compared})
@@ -89,7 +88,7 @@ def estimate_arrays(
     for one in compared:
         screen.print(ratio_line(one), soft_wrap=True)
     if not details:
-        typer.echo("--details prints the sum at each unit, the pairs, the band and the assumptions")
+        typer.echo("--details prints the sum at each unit, the pairs and the assumptions")
 
 
 def _print_details(data: Mapping[str, Any]) -> None:
@@ -98,9 +97,6 @@ def _print_details(data: Mapping[str, Any]) -> None:
         print_table(_sums(data, names), f"sum of all other units there, times one unit's edge level: {_HOW}")
     if 1 < len(names) <= _MOST_PAIRS:
         print_table(_matrix(data, names), "% of a unit's motion at its edge that reaches the middle of another")
-    if data["band"] and len(names) > 1:
-        title = f"nearest neighbour, %; amplitude at {data['worst']['place']} from all others: {_HOW}"
-        print_table(_band(data), title)
     ranges = f"In brackets: {data['range']}."
     print_indented(ranges, *data["assumptions"], f"Distances are {data['distances']}.")
 
@@ -109,7 +105,7 @@ def _sums(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]
     """Tabulate the amplitude at each unit from all others."""
     mixed = len({place["drive"] for place in data["places"]}) > 1
     labels = {"own_drive": "own"} if mixed else {}
-    labels |= {"flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
+    labels |= {"flat": "flat", "axial": "axial"}
     sums = {
         f"{label}\n{head}": data["sums"][key][kind]
         for key, label in labels.items()
@@ -126,24 +122,3 @@ def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str
         shares = {name: "-" if value is None else number(100 * value, 2) for name, value in decays}
         rows.append({"drives": place["name"], **shares})
     return rows
-
-
-def _band(data: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Tabulate the nearest neighbour and the worst place over the band."""
-    columns = {
-        "middle": ("nearest_centre", 100),
-        "edge": ("nearest_edge", 100),
-        "root": ("root_sum_of_squares", 1),
-        "sum": ("sum", 1),
-    }
-    return [
-        {
-            "Hz": f"{row['frequency_hz']:g}",
-            **{
-                f"{drive}\n{head}": number(by * row[drive][key], 2)
-                for drive in DRIVES
-                for head, (key, by) in columns.items()
-            },
-        }
-        for row in data["band"]
-    ]

@@ -11,10 +11,9 @@ from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
-from unitcad.arrays.array_file import makeable_array, plan_tools, sound_array
+from unitcad.arrays.array_file import plan_tools, suggest_for_array
 from unitcad.arrays.circuit import has_circuit, lay_circuit
 from unitcad.arrays.constructions import Construction, construction_of
-from unitcad.arrays.offers import suggest_for_array, with_other_ways
 from unitcad.arrays.sheet import at_place
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.designs.design import Fitting
@@ -244,9 +243,7 @@ class PatchMoulds(MouldSet):
         try:
             return plan_tools(self.arranged)
         except Refusal as refusal:
-            asked = self.arranged.asked
-            better = suggest_for_array(refusal, asked, makeable_array, sound_array(asked))
-            raise with_other_ways(better, asked, makeable_array) from None
+            raise suggest_for_array(refusal, self.arranged.asked) from None
 
     @cached_property
     def dimensions(self) -> Dimensions:

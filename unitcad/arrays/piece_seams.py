@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise, product
 from typing import Literal, NamedTuple
 
-from unitcad.arrays.array import Array, Box, Placed
+from unitcad.arrays.array import Array, Box
 from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.checks.seam import WEEP
 from unitcad.errors import Refusal
-from unitcad.geometry.segments import Point, nearer, to_segment
 from unitcad.moulds.cuts import (
     BESIDE,
     FAR,
@@ -18,11 +18,11 @@ from unitcad.moulds.cuts import (
     Axis,
     Feature,
     Interval,
-    Place,
     Seam,
     Sized,
     in_gaps,
     length,
+    seams,
     to_seam_frame,
 )
 from unitcad.moulds.pieces import row, row_width
@@ -69,7 +69,28 @@ def too_much(
 
 STEP = 0.5
 """Between two places that are tried for a text, mm."""
-Side = Literal["top", "bottom", "left", "right"]
+Side = Literal["front", "back", "left", "right"]
+SIDES: dict[Side, tuple[int, int]] = {"front": (1, -1), "back": (1, 1), "left": (0, -1), "right": (0, 1)}
+"""The axis that leads to each side of a tool, and its sign there."""
+
+
+def pieces(outline: Box, seams: Iterable[Seam]) -> list[Box]:
+    """Return the extent of each piece of a tool, between the teeth at its ends, in the order of their numbers."""
+    cut_at, (x0, y0, x1, y1) = sorted(seams, key=lambda seam: seam.extent), outline
+    along = bool(cut_at) and cut_at[0].across == "y"
+    low, high = (y0, y1) if along else (x0, x1)
+    parts = [(a[1], b[0]) for a, b in pairwise([(low, low), *(seam.extent for seam in cut_at), (high, high)])]
+    return [(x0, a, x1, b) for a, b in reversed(parts)] if along else [(a, y0, b, y1) for a, b in parts]
+
+
+def outer_sides(piece: Box, outline: Box) -> list[Side]:
+    """Return the sides of a tool that one of its pieces has."""
+    return [side for side, (axis, sign) in SIDES.items() if piece[axis + 1 + sign] == outline[axis + 1 + sign]]
+
+
+def along_side(piece: Box, side: Side) -> Interval:
+    """Return a piece's interval along one of its sides."""
+    return (piece[0], piece[2]) if SIDES[side][0] else (piece[1], piece[3])
 
 
 class Strip(NamedTuple):
@@ -87,48 +108,29 @@ class Strip(NamedTuple):
     taken: Sequence[Box] | None = None
 
 
-def on_pieces(strip: Strip, rows: Sequence[Sequence[str]], seams: Sequence[Seam]) -> list[Shape]:
+def on_pieces(strip: Strip, rows: Sequence[Sequence[str]], seams: Sequence[Seam]) -> Iterator[Shape]:
     """Draw a row of texts on each piece of a tool: the first of the `rows` that has room there, otherwise the last.
 
-    If the tool is cut the piece's number follows them. A piece without an outer edge has none.
+    If the tool is cut the piece's number follows them.
     """
-    x0, y0, x1, y1 = strip.outer
-    columns, lines = intervals((x0, x1), seams, "x"), intervals((y0, y1), seams, "y")[::-1]
-    letters: list[Shape] = []
-    for j, along in enumerate(lines):
-        for i, across in enumerate(columns):
-            ends: tuple[tuple[Side, bool], ...] = (
-                ("top", j == 0),
-                ("bottom", j == len(lines) - 1),
-                ("left", i == 0),
-                ("right", i == len(columns) - 1),
-            )
-            free: list[Side] = [side for side, there in ends if there]
-            within: dict[Side, Interval] = {side: across if side in ("top", "bottom") else along for side in free}
-            number = [str(j * len(columns) + i + 1)] if seams else []
-            letters += _on_piece(strip, [[*each, *number] for each in rows], within)
-    return letters
-
-
-def _on_piece(strip: Strip, rows: Sequence[Sequence[str]], within: Mapping[Side, Interval]) -> Iterator[Shape]:
-    """Draw a row of texts on one of a piece's sides; `within`: the piece's interval along each."""
-    sides = sorted(within, key=lambda side: side != strip.first)
-    for texts, side in product(rows, sides):
-        start = _start(strip, side, texts, within[side])
-        if start is not None:
-            yield from _on_side(strip, side, texts, start)
-            return
-    if sides:
-        side = sides[0]
-        yield from _on_side(strip, side, rows[-1], within[side][0] + _margin(strip, side, within[side]))
+    for number, piece in enumerate(pieces(strip.outer, seams), 1):
+        numbered = [[*each, *([str(number)] if seams else [])] for each in rows]
+        sides = sorted(outer_sides(piece, strip.outer), key=lambda side: side != strip.first)
+        for texts, side in product(numbered, sides):
+            if (start := _start(strip, side, texts, piece)) is not None:
+                break
+        else:
+            side, texts = sides[0], numbered[-1]
+            start = along_side(piece, side)[0] + _margin(strip, side, piece)
+        yield from _on_side(strip, side, texts, start)
 
 
 def _on_side(strip: Strip, side: Side, texts: Sequence[str], start: float) -> Iterator[Shape]:
     """Draw texts on one side of the strip, one after the other, from `start` along it."""
     x0, y0, x1, y1 = strip.outer
     high = HEIGHT * strip.stroke
-    if side in ("top", "bottom"):
-        y = y0 + strip.inset if side == "bottom" else y1 - strip.inset - high
+    if SIDES[side][0]:
+        y = y0 + strip.inset if side == "front" else y1 - strip.inset - high
         yield from row(texts, strip.stroke, (start, y), strip.heights)
     else:
         # Read from the right, from below to above.
@@ -136,18 +138,14 @@ def _on_side(strip: Strip, side: Side, texts: Sequence[str], start: float) -> It
         yield from (moved(turned(c, "z", 1), x, start) for c in row(texts, strip.stroke, (0.0, 0.0), strip.heights))
 
 
-def _start(strip: Strip, side: Side, texts: Sequence[str], within: Interval) -> float | None:
-    """Return the start of texts on a side: in the middle, or next to its margin, clear of taken areas, or None.
-
-    `within` is the piece's interval along that side.
-    """
-    width, margin = row_width(texts, strip.stroke), _margin(strip, side, within)
+def _start(strip: Strip, side: Side, texts: Sequence[str], piece: Box) -> float | None:
+    """Return the start of texts on a side: in the middle, or next to its margin, clear of taken areas, or None."""
+    width, margin, within = row_width(texts, strip.stroke), _margin(strip, side, piece), along_side(piece, side)
     if strip.taken is None:
         return (within[0] + within[1] - width) / 2 if width + 2 * margin <= within[1] - within[0] else None
-    axis = 0 if side in ("top", "bottom") else 1
-    ends = strip.outer[1 - axis], strip.outer[3 - axis]
-    deep = strip.inset + HEIGHT * strip.stroke
-    low, high = (ends[1] - deep, ends[1]) if side in ("top", "right") else (ends[0], ends[0] + deep)
+    to_side, sign = SIDES[side]
+    axis, deep = 1 - to_side, strip.inset + HEIGHT * strip.stroke
+    low, high = sorted((strip.outer[to_side + 1 + sign], strip.outer[to_side + 1 + sign] - sign * deep))
     taken = [(b[axis], b[2 + axis]) for b in strip.taken if b[1 - axis] < high and b[3 - axis] > low]
     at = within[0] + margin
     while at + width <= within[1]:
@@ -157,19 +155,14 @@ def _start(strip: Strip, side: Side, texts: Sequence[str], within: Interval) -> 
     return None
 
 
-def _margin(strip: Strip, side: Side, within: Interval) -> float:
+def _margin(strip: Strip, side: Side, piece: Box) -> float:
     """Return how far from an end of a piece a text begins: from a seam, or from the tool's own edge, mm."""
-    edge = strip.outer[0 if side in ("top", "bottom") else 1]
-    return strip.inset if within[0] == edge else BESIDE
+    axis = 1 - SIDES[side][0]
+    return strip.inset if piece[axis] == strip.outer[axis] else BESIDE
 
 
 EDGE = 0.5
 """From a tooth to the sheet's edge, at least, mm: beyond it a groove would cut the tooth."""
-THROUGH = 2.5
-"""A stepping line is straight so far to either side of a row's middle, mm: fins of the row end next to it."""
-
-STEPS = (0,), (0, 1, 2, 1)
-"""Steps of lines from row to row, in half pitches: two steps to one side leave room for a tooth."""
 
 
 def box_feature(x0: float, y0: float, x1: float, y1: float) -> Feature:
@@ -191,48 +184,51 @@ def of_sheet(array: Array) -> list[Feature]:
     return slots + [box_feature(x[0], y[0], x[1], y[1]) for x in ends[0] for y in ends[1]]
 
 
-def size_tool(
+def seams_of(
     array: Array,
     outline: Box,
+    called: str,
     clear: Sequence[Feature],
     close: Sequence[Feature],
+    fault: Callable[[Sequence[Seam]], str],
+    *,
     under: Sequence[Feature] = (),
-) -> tuple[Sized, ...]:
-    """Return a tool with its `outline` along x and along y, if it exceeds the bed.
+    other: Sequence[Seam] = (),
+) -> tuple[Seam, ...]:
+    """Return the seams of a tool, named `called`, with this `outline`; () if it fits the bed.
 
     Cuts are between the features `clear` if that gives pieces that fit, otherwise between `close`, which none may meet.
-    A straight line may cross features `under` the tool, teeth may not. Raises Refusal for a sheet that is
-    too narrow for a dovetail.
+    The line may cross features `under` the tool, teeth may not. `fault` and `other` as for `seams`. Raises Refusal for
+    a tool that exceeds the bed along both axes, and for a sheet that is too narrow for a dovetail.
     """
     moulds = array.unit.moulds
-    found: list[Sized] = []
     x0, y0, x1, y1 = outline
     along: tuple[tuple[Axis, Interval, float], ...] = (
         ("x", (x0, x1), moulds.bed_x_mm),
         ("y", (y0, y1), moulds.bed_y_mm),
     )
-    for axis, ends, bed in along:
-        if ends[1] - ends[0] > bed + 1e-9:
-            kept, closer, crossed = (
-                tuple(Feature(tuple(to_seam_frame(corner, axis) for corner in f.corners), f.radius) for f in each)
-                for each in (clear, close, under)
-            )
-            choices = tuple(in_gaps(ends, kept)), tuple(in_gaps(ends, closer, narrow=True))
-            if axis == "x":
-                choices = choices[0], (*choices[1], *_stepping(array, (*closer, *crossed)))
-            found.append(Sized(axis, ends, bed, _across(array, axis), (*closer, *crossed), choices))
-    return tuple(found)
+    over = [each for each in along if each[1][1] - each[1][0] > each[2] + 1e-9]
+    if not over:
+        return ()
+    axis, ends, bed = min(over, key=lambda each: each[1][1] - each[1][0] - each[2])
+    if len(over) > 1:
+        limit = f"{called} exceeds the bed along both axes, and tools are cut across one only"
+        raise Refusal(f"moulds.bed_{axis}_mm", bed, limit, math.ceil(10 * (ends[1] - ends[0]) - 1e-6) / 10)
+    kept, closer, crossed = (
+        tuple(Feature(tuple(to_seam_frame(corner, axis) for corner in f.corners), f.radius) for f in each)
+        for each in (clear, close, under)
+    )
+    play, teeth, avoided = moulds.plinth_clearance_mm, _across(array, axis), (*closer, *crossed)
+    choices = (
+        in_gaps(ends, kept, teeth, avoided, play, axis),
+        in_gaps(ends, closer, teeth, avoided, play, axis, narrow=True),
+    )
+    return seams(Sized(axis, ends, bed, choices), called, other, fault)
 
 
 def longer_than_bed(spec: Spec, length: float) -> bool:
     """Tell whether a bar fits the bed neither along nor across."""
     return length > max(spec.moulds.bed_x_mm, spec.moulds.bed_y_mm) + 1e-9
-
-
-def intervals(ends: Interval, seams: Iterable[Seam], across: Axis) -> list[Interval]:
-    """Return the extent of each piece of a tool along an axis, between the teeth at its ends, from below."""
-    marks = sorted(seam.extent for seam in seams if seam.across == across)
-    return [(a[1], b[0]) for a, b in pairwise([(ends[0], ends[0]), *marks, (ends[1], ends[1])])]
 
 
 def _across(array: Array, across: Axis) -> Interval:
@@ -245,43 +241,3 @@ def _across(array: Array, across: Axis) -> Interval:
         limit = f"its tools are larger than the bed; a dovetail between their pieces needs a sheet {least:.3g} mm wide"
         raise Refusal("sheet.margin_mm", array.sheet.margin_mm, limit, mm(needed + 0.005))
     return low + EDGE, high - EDGE
-
-
-def _stepping(array: Array, features: Sequence[Feature]) -> Iterator[Place]:
-    """Yield the places of lines that step between the rows from gap to gap, clear of the features."""
-    rows: dict[float, list[Placed]] = {}
-    for place in sorted(array.places, key=lambda place: (place.y, place.x)):
-        rows.setdefault(place.y, []).append(place)
-    starts = sorted({(a.x + b.x) / 2 for row in rows.values() for a, b in pairwise(row)})
-    for start, steps, through in product(starts, STEPS, (THROUGH, 0.0)):
-        wanted = [start + steps[i % len(steps)] * array.pitch_mm / 2 for i in range(len(rows))]
-        line = _line([(y, _passes(rows[y], x, array.pitch_mm)) for y, x in zip(rows, wanted, strict=True)], through)
-        stretches = list(pairwise(line))
-        if len({x for x, _ in line}) > 1 and not any(
-            nearer(ends, feature.corners, feature.radius + BESIDE) for ends in stretches for feature in features
-        ):
-            yield Place(start, line)
-
-
-def _passes(row: Sequence[Placed], start: float, pitch: float) -> float:
-    """Return the point at which a line passes a row: the gap, or the place next to the row, nearest to `start`."""
-    beside = [row[0].x - pitch / 2, row[-1].x + pitch / 2]
-    if not beside[0] < start < beside[1]:
-        return start
-    return min([*((a.x + b.x) / 2 for a, b in pairwise(row)), *beside], key=lambda x: (abs(x - start), x))
-
-
-def _line(passed: Sequence[tuple[float, float]], through: float) -> tuple[Point, ...]:
-    """Return the line that passes each row (y, x), straight for `through` mm to either side if it turns there."""
-    line = [(passed[0][1], -FAR)]
-    for (y, x), (above, after) in pairwise(passed):
-        if x != after:
-            by = min(through, (above - y) / 6)
-            line += [(x, y + by), (after, above - by)]
-    line = list(dict.fromkeys([*line, (passed[-1][1], FAR)]))
-    kept = [line[0]]
-    for point, after in pairwise(line[1:]):
-        # None if the line goes straight on.
-        if to_segment(point, kept[-1], after) > 1e-3:
-            kept.append(point)
-    return (*kept, line[-1])

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
-from itertools import groupby
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from unitcad.arrays.array import Array, Placed, Sheet
@@ -15,7 +13,7 @@ from unitcad.designs.dimensions import WIRE_GAP
 from unitcad.designs.limits import EPS
 from unitcad.geometry.segments import Point, between_segments, to_box, to_segment
 from unitcad.spec import Spec
-from unitcad.text import join_words, number
+from unitcad.text import join_words
 
 CLEAR = 0.5
 """From a tail to a unit, a strap slot or another tail, at least, mm (assumed: a hand lays the tails)."""
@@ -94,13 +92,6 @@ class Ways:
                     return "a strap slot"
         return ""
 
-    def covered(self, i: int, angle: float) -> bool:
-        """Tell whether a unit's tails at an angle end under the sheet."""
-        exit = dimensions(self.places[i].unit).exit
-        if exit is None or exit.high > self.sheet.low + EPS:
-            return False  # the tail is on the sheet
-        return any(_is_covered(tail, self.sheet, EPS) for tail in tails(self.places[i], angle))
-
     def longest(self, i: int, tried: Sequence[float]) -> float:
         """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 if none does."""
         low, high = 0, int(tail_length(self.places[i].unit) * 10)
@@ -144,7 +135,7 @@ def _laid(places: Sequence[Placed], asked: Collection[int], sheet: Sheet, *, out
             if free is not None and angle % 90:
                 break
             why = ways.blocked(i, angle)
-            covered = out and ways.covered(i, angle)
+            covered = out and _ends_under(place, angle, sheet)
             if not why and (free is None or not covered):
                 free = angle
                 if not covered:
@@ -166,123 +157,43 @@ def candidates(place: Placed) -> list[float]:
     return sorted(every, key=lambda angle: (angle % 90 != 0, angle % 45 != 0, away(angle), angle))
 
 
-def _is_covered(tail: Strip, sheet: Sheet, further: float) -> bool:
-    """Tell whether a corner or the middle of a tail's end, `further` along it by so much (mm), is under the sheet."""
-    (xa, ya), (xb, yb), half = tail
-    long = math.hypot(xb - xa, yb - ya)
-    along = (xb - xa) / long, (yb - ya) / long
-    x0, y0, x1, y1 = sheet.outline
-    r = sheet.corner_mm
-    ends = [
-        (xb + further * along[0] - aside * along[1], yb + further * along[1] + aside * along[0])
-        for aside in (-half, 0.0, half)
-    ]
-    return any(to_box(at, at, (x0 + r, y0 + r, x1 - r, y1 - r)) <= r for at in ends)
-
-
-def _to_edge(tail: Strip, sheet: Sheet) -> float:
-    """Return how far a tail has to go on until all of its width is out of the sheet's outline, mm."""
-    x0, y0, x1, y1 = sheet.outline
-    low, high = 0.0, math.hypot(x1 - x0, y1 - y0)
-    # The outline is convex.
-    while high - low > EPS / 2:
-        middle = (low + high) / 2
-        low, high = (middle, high) if _is_covered(tail, sheet, middle) else (low, middle)
-    return high
+def _ends_under(place: Placed, angle_deg: float, sheet: Sheet) -> bool:
+    """Tell whether a unit's tails at an angle end under the sheet: a corner or the middle of an end is."""
+    exit = dimensions(place.unit).exit
+    if exit is None or exit.high > sheet.low + EPS:
+        return False  # the tail is on the sheet
+    (x0, y0, x1, y1), r = sheet.outline, sheet.corner_mm
+    for (xa, ya), (xb, yb), half in tails(place, angle_deg):
+        long = math.hypot(xb - xa, yb - ya)
+        ux, uy = (xb - xa) / long, (yb - ya) / long
+        ends = [(xb + EPS * ux - side * uy, yb + EPS * uy + side * ux) for side in (-half, 0.0, half)]
+        if any(to_box(at, at, (x0 + r, y0 + r, x1 - r, y1 - r)) <= r for at in ends):
+            return True
+    return False
 
 
 MOST_NAMES = 12
-"""Places that a warning names before it counts the others."""
+"""Places that a text names before it counts the others."""
 
 
-@dataclass(frozen=True)
-class CoveredTail:
-    """A tail, or a bundle of wires, whose end the sheet covers.
-
-    short_mm    from its end to the place at which all of its width is out, along it
-    length_mm   of the tail that would come out, beyond the unit's edge
-    field       the spec's key of that length
-    blocked_by  the obstacle of the straight way there; "" if it is free
-    angle_deg   at which the tail as it is would come out; None if none of the angles that are tried is free
-    """
-
-    place: str
-    short_mm: float
-    length_mm: float
-    field: str
-    blocked_by: str
-    angle_deg: float | None
-
-
-def covered_tails(array: Array) -> tuple[CoveredTail, ...]:
-    """Return the tails that end under the sheet, in the order of places; () if the sheet covers none."""
+def covered_tails(array: Array) -> tuple[str, ...]:
+    """Return the places whose tail, or bundle of wires, ends under the sheet."""
     if not construction_of(array.construction, array.cast).own_tails:
         return ()
-    places, sheet = array.places, array.sheet
-    ways = Ways(places, sheet, [tails(place, place.angle_deg) for place in places])
-    found = []
-    for i, place in enumerate(places):
-        if not ways.covered(i, place.angle_deg):
-            continue
-        others = [j for j in range(len(places)) if j != i]
-        ways.near[i] = sorted(others, key=lambda j, x=place.x, y=place.y: math.dist((x, y), (places[j].x, places[j].y)))
-        short = max(_to_edge(tail, sheet) for tail in ways.laid[i])
-        length = tail_length(place.unit) + short
-        free = (angle for angle in candidates(place) if not ways.covered(i, angle) and not ways.blocked(i, angle))
-        blocked = ways.blocked(i, place.angle_deg, length)
-        # A length to type: the next tenth that is not shorter.
-        typed = math.ceil(length * 10 - 1e-3) / 10
-        found.append(
-            CoveredTail(place.name, round(short, 2), typed, length_field(place.unit), blocked, next(free, None))
-        )
-    return tuple(found)
+    return tuple(place.name for place in array.places if _ends_under(place, place.angle_deg, array.sheet))
 
 
-def where_they_end(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
-    """Say how far before the sheet's edge tails end, measured along them, the farthest last."""
-
-    def short(tail: CoveredTail) -> float:
-        return float(number(tail.short_mm, 2))
-
-    groups = groupby(sorted(covered, key=short), key=short)
-    first, *others = (f"{number(way)} mm%s at {_names(same, most_names)}" for way, same in groups)
-    return join_words([first % " before its edge, measured along the tail,", *(other % "" for other in others)])
-
-
-def longer_tails(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
-    """Say which tails would come out turned, which if they were longer, and which have no straight way there."""
-
-    def wanted(tail: CoveredTail) -> tuple[str, float]:
-        return tail.field, tail.length_mm
-
-    turned = [(tail.angle_deg, tail) for tail in covered if tail.angle_deg is not None]
-    said = [
-        f"With angle_deg = {number(angle)} {_names((tail for _, tail in same), most_names)} would come out as it is."
-        for angle, same in groupby(sorted(turned, key=lambda pair: pair[0]), key=lambda pair: pair[0])
-    ]
-    straight = [tail for tail in covered if tail.angle_deg is None]
-    free = sorted((tail for tail in straight if not tail.blocked_by), key=wanted)
-    said += [
-        f"With {field} = {number(length)} {_names(same, most_names)} would reach the edge."
-        for (field, length), same in groupby(free, key=wanted)
-    ]
-    if stopped := [tail for tail in straight if tail.blocked_by]:
-        said.append(f"No straight way out is free at {_names(stopped, most_names)}.")
-    return " ".join(said)
+def named(places: Sequence[str]) -> str:
+    """Return places in words: some by name, the others by their number."""
+    more = len(places) - MOST_NAMES
+    return join_words([*places[:MOST_NAMES], *([f"{more} others"] if more > 0 else [])])
 
 
 def covered_tails_warning(array: Array) -> list[str]:
     """Return the warning of tails that end under the sheet; [] if none does."""
-    covered = covered_tails(array)
-    if not covered:
+    if not (covered := covered_tails(array)):
         return []
     return [
-        f"tails end under the sheet, {where_they_end(covered, MOST_NAMES)}. {longer_tails(covered, MOST_NAMES)} "
-        "Solder wires to a tail that stays under the sheet before its unit goes in"
+        f"tails end under the sheet at {named(covered)}: solder wires to them before their units go in, or take longer "
+        "tails, or another angle_deg there"
     ]
-
-
-def _names(tails: Iterable[CoveredTail], most: int) -> str:
-    """Return the tails' places in words; with a `most` only so many, and the number of the others."""
-    names = [tail.place for tail in tails]
-    return join_words([*names[:most], f"{len(names) - most} others"] if 0 < most < len(names) else names)

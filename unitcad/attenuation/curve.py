@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -59,7 +59,6 @@ CONTACT: dict[Drive, tuple[tuple[float, ...], tuple[float, ...]]] = {
 Finite elements of the paper's two designs with four pairs of silicones each, skin that sticks to the unit or lets it
 slide, 100 to 150 Hz, against the layered solver (`python -m benchmarks.accuracy skin` makes them again).
 """
-Reading = Literal["u", "u_z"]
 _RTOL = 1e-3
 
 
@@ -100,20 +99,19 @@ def decay(
     drive: Drive | None = None,
     hertz: float | None = None,
     end: Mapping[str, int] | None = None,
-    reading: Reading = "u",
 ) -> np.ndarray:
     """Return the bare skin's motion at `radii` (m, any shape) from a unit's middle, over that at its edge.
 
     `drive`, `hertz`: default: those of the motor and the unit. `end`: as in `inputs.tissue_medium`, or "frequency".
-    `reading`: |u| (`U_DEFINITION`), or only |u_z|. Radii inside the edge give the motion of the bare skin.
-    One response serves all radii. Raises `Refusal` for values that no tissue has.
+    The motion is |u| (`U_DEFINITION`), inside the edge too. One response serves all radii. Raises `Refusal` for values
+    that no tissue has.
     """
     if hertz is not None:
         variant = replace(variant, frequency=Quantity(hertz))
     wanted = np.asarray(radii, dtype=float)
     medium, load, omega = _case(variant, drive or variant.drive, end or {})
     found = components(medium, load, omega, np.append(wanted.ravel(), variant.diameter / 2.0), _RTOL)
-    size = np.abs(found[2]) if reading == "u_z" else np.linalg.norm(found, axis=0)
+    size = np.linalg.norm(found, axis=0)
     return (size[:-1] / size[-1]).reshape(wanted.shape)
 
 
@@ -186,18 +184,6 @@ def _decays(variants: Sequence[EstimateInput]) -> list[float]:
             edge, far = _size(_response(one, one.drive, r, {}, _SLOPE_RTOL))
             decays[key] = float(far / edge)
     return [decays[one.tissue, one.frequency, one.motor_diameter, one.diameter] for one in variants]
-
-
-def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> dict[str, list[float]]:
-    """Return |u| under a `flat` and an `axial` drive and, `u`, the motor's; `u_z`: |u_z| under an axial one.
-
-    Each over its value at the edge, at distances (mm) from the edge and one frequency (Hz), nominal tissue.
-    """
-    r = variant.diameter / 2.0 + 1e-3 * np.array(distances_mm)
-    drives: tuple[Drive, ...] = ("flat", "axial")
-    found = {drive: decay(variant, r, drive, frequency) for drive in drives}
-    parts = {"u": found[variant.drive], **found, "u_z": decay(variant, r, "axial", frequency, reading="u_z")}
-    return {name: part.tolist() for name, part in parts.items()}
 
 
 def _size(one: Response) -> np.ndarray:

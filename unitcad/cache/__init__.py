@@ -1,8 +1,7 @@
 """Content kept under a key, so that each distinct piece of work is done once.
 
 A key is a hash of all that the work reads. It names either data (JSON) or the SHA-256 of a file's content; equal
-contents are kept once. `MemoryStore` keeps them for one build, `SharedStore` for several machines, `DiskStore` for
-all who share a folder:
+contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for all who share a folder:
 
     <root>/unitcad-cache          marks the folder as a cache of unitcad
     <root>/data/ab/<key>          checksum, newline, JSON
@@ -15,20 +14,16 @@ all who share a folder:
 """
 
 from unitcad.cache.disk import DEFAULT_LIMIT_MB, DiskStore, Usage, collect, default_root, held, is_free, usage
-from unitcad.cache.shared_store import SharedStore, absolute
-from unitcad.cache.store import Bundle, Entry, MemoryStore, MissingContent, Store, digest
+from unitcad.cache.store import Entry, MemoryStore, MissingContent, Store, digest
 
 __all__ = [
     "DEFAULT_LIMIT_MB",
-    "Bundle",
     "DiskStore",
     "Entry",
     "MemoryStore",
     "MissingContent",
-    "SharedStore",
     "Store",
     "Usage",
-    "absolute",
     "collect",
     "default_root",
     "digest",

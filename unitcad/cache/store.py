@@ -8,7 +8,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from unitcad.errors import UnitcadError
@@ -64,31 +64,14 @@ class Store(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Bundle:
-    """A store's entries without content, for another store: data and the SHA-256 of files by key, sizes by SHA-256."""
-
-    data: dict[str, Any] = field(default_factory=dict)
-    files: dict[str, str] = field(default_factory=dict)
-    sizes: dict[str, int] = field(default_factory=dict)
-
-
 class MemoryStore:
-    """A store that lasts one build.
+    """A store that lasts one build."""
 
-    A file of the bundle `known` counts as there, but another store keeps it: it can't be placed from here.
-    """
-
-    def __init__(self, known: Bundle | None = None) -> None:
+    def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.contents: dict[str, bytes] = {}
-        self._data: dict[str, Any] = dict(known.data) if known else {}
-        self._files: dict[str, str] = dict(known.files) if known else {}
-        self._elsewhere = dict(known.sizes) if known else {}
-
-    def bundle(self) -> Bundle:
-        """Return the current contents."""
-        return Bundle(dict(self._data), dict(self._files), {sha: self.size(sha) for sha in self._files.values()})
+        self._data: dict[str, Any] = {}
+        self._files: dict[str, str] = {}
 
     @contextlib.contextmanager
     def entry(self, key: str, *, intact: Intact = lambda data: True) -> Iterator[Entry]:
@@ -110,10 +93,10 @@ class MemoryStore:
         return self._files[key]
 
     def has(self, sha256: str) -> bool:
-        return sha256 in self.contents or sha256 in self._elsewhere
+        return sha256 in self.contents
 
     def size(self, sha256: str) -> int:
-        return len(self.contents[sha256]) if sha256 in self.contents else self._elsewhere[sha256]
+        return len(self.content(sha256))
 
     def content(self, sha256: str) -> bytes:
         if sha256 not in self.contents:

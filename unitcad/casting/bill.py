@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.casting.drawings import side_places, tape_places, tongue_prop
+from unitcad.casting.drawings import tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
 from unitcad.export.printing import layout
@@ -161,8 +161,7 @@ def list_consumables(
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
     named = {"caliper", *(tool for step in steps for tool in step.required_tools)}
     lidded = [batch for batch in batches if batch.step.lid]
-    tape = len(tape_places(moulds)) + len(side_places(moulds)) if cups else 0
-    strips = 2 * tape * sum(not step.lid for step in moulds.plan.steps)
+    strips = 2 * (len(tape_places(moulds)) if cups else 0) * sum(not step.lid for step in moulds.plan.steps)
     if strips:
         named.discard("adhesive tape")  # its strips are on the list
     for tool in sorted(named, key=[*REQUIRED_TOOLS].index):

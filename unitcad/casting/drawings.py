@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from unitcad.designs import layer_colour
 from unitcad.designs.design import Cell
-from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH, PRY_HALF_WIDTH, outline, plate_top
+from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH, outline, plate_top
 from unitcad.moulds.cup import skirt_end, window_section
-from unitcad.moulds.cuts import Axis, Interval
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -24,8 +22,6 @@ CLEAR = 5.0
 """Between a piece that is lifted off and its place, mm."""
 Offset = tuple[float, float, float]
 DOWN = (0.0, 0.0, -1.0)
-BESIDE = 3.0
-"""From a filament's middle to tape, mm."""
 HELD = 60.0
 """Length of a cup's side that one strip of tape holds down, mm (assumed)."""
 TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
@@ -144,87 +140,31 @@ def spirit_level(half: float, z: float, plate: tuple[float, float], bottom: floa
 
 
 def tape_places(moulds: MouldSet) -> tuple[float, ...]:
-    """Return x of the first edge of each strip of tape on the front and the back of a cup, mm.
-
-    One for each `HELD` mm of it, the outer two at its ends, the others next to filaments, which leave in the middle.
-    Each piece of a split tool that reaches these sides has one; if it is too narrow, the strip reaches over a seam.
-    """
-    plan, half = moulds.plan, moulds.plan.layout.cup[0]
+    """Return x of the first edge of each strip of tape on the front and the back of a cup, mm: one for each `HELD`."""
+    half = moulds.plan.layout.cup[0]
     left, right, count = CORNER_RADIUS - half, half - MARK - TAPE_WIDTH, math.ceil(2 * half / HELD)
-    seams = sorted({seam.at for split in plan.splits for seam in split.seams if seam.across == "x"})
-    if count == 1 and not seams:
-        return (left,)
-    beside = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
-    free = [at for at in beside if all(not at < cell.x < at + TAPE_WIDTH for cell in plan.layout.cells)]
-
-    def add(wanted: float, among: list[float]) -> None:
-        places.add(min(among, key=lambda at: (abs(at - wanted), at)))
-
-    places = {left, right}
-    for i in range(1, count - 1 if free else 0):
-        add(left + (right - left) * i / (count - 1), free)
-    for low, high in pairwise((-half, *seams, half)):
-        high -= TAPE_WIDTH
-        there = [at for at in free if low <= at <= high]
-        if there and not any(low <= at <= high for at in places):
-            add((low + high) / 2, there)
-    for low, high in _pieces(moulds, "x", half):
-        if free and not any(low <= at <= high - TAPE_WIDTH for at in places):
-            places.add(_most_on(low, high, free))
-    return tuple(sorted(places))
-
-
-def side_places(moulds: MouldSet) -> tuple[float, ...]:
-    """Return y of the first edge of strips on the two other sides, mm: for pieces between others, clear of slots.
-
-    () if every piece that has an outer edge reaches the front or the back.
-    """
-    half, beside = moulds.plan.layout.cup[1], PRY_HALF_WIDTH + 1.0
-    places: set[float] = set()
-    for low, high in _pieces(moulds, "y", half):
-        if low > -half and high < half:
-            choices = ((low + high - TAPE_WIDTH) / 2, beside, -beside - TAPE_WIDTH)
-            places.add(_most_on(low, high, [at for at in choices if not -beside - TAPE_WIDTH < at < beside]))
-    return tuple(sorted(places))
-
-
-def _pieces(moulds: MouldSet, axis: Axis, half: float) -> Iterator[Interval]:
-    """Yield both ends of each piece of split tools along an axis, at the two edges along it."""
-    for split in moulds.plan.splits:
-        lines = [seam.line for seam in split.seams if seam.across == axis]
-        ends = sorted((min(line[0][0], line[-1][0]), max(line[0][0], line[-1][0])) for line in lines)
-        yield from ((a[1], b[0]) for a, b in pairwise([(-half, -half), *ends, (half, half)]))
-
-
-def _most_on(low: float, high: float, places: Sequence[float]) -> float:
-    """Return the place whose strip overlaps a piece most, the nearest to its middle of those alike."""
-
-    def rank(at: float) -> tuple[float, float, float]:
-        return max(low - at, at + TAPE_WIDTH - high, 0.0), abs(at + TAPE_WIDTH / 2 - (low + high) / 2), at
-
-    return min(places, key=rank)
+    if moulds.plan.splits:
+        count = max(count, 2 * len(moulds.plan.splits[0].pieces))
+    return tuple(left + (right - left) * i / max(count - 1, 1) for i in range(count))
 
 
 def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
     """Draw the strips of tape on a pour's cup: its wall, the plate, the plate's edge and underside."""
     lay, (bottom, top), thick = moulds.plan.layout, moulds.plate, TAPE_THICKNESS
-    strips: list[Extra] = []
-    for axis, places in ((1, tape_places(moulds)), (0, side_places(moulds))):
-        cup, plate = lay.cup[axis], lay.plate[axis]
-        runs = [
-            (cup, cup + thick, (top, step.rim - BELOW_RIM)),
-            (cup, plate + thick, (top, top + thick)),
-            (plate, plate + thick, (bottom - thick, top + thick)),
-            (plate - 5.0, plate + thick, (bottom - thick, bottom)),
-        ]
-        for side in (1, -1) if places else ():
-            boxes = [
-                box(at, at + TAPE_WIDTH, a, b, *heights) if axis else box(a, b, at, at + TAPE_WIDTH, *heights)
-                for at in places
-                for a, b, heights in ((*sorted((side * a, side * b)), heights) for a, b, heights in runs)
-            ]
-            strips.append(Extra(union(boxes), TAPE))
-    return tuple(strips)
+    cup, plate = lay.cup[1], lay.plate[1]
+    runs = (
+        (cup, cup + thick, (top, step.rim - BELOW_RIM)),
+        (cup, plate + thick, (top, top + thick)),
+        (plate, plate + thick, (bottom - thick, top + thick)),
+        (plate - 5.0, plate + thick, (bottom - thick, bottom)),
+    )
+    strips = [
+        box(at, at + TAPE_WIDTH, min(side * a, side * b), max(side * a, side * b), *heights)
+        for side in (1, -1)
+        for at in tape_places(moulds)
+        for a, b, heights in runs
+    ]
+    return (Extra(union(strips), TAPE),)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from unitcad.casting.drawings import grip_of, side_places, tape_places, tongue_prop
+from unitcad.casting.drawings import grip_of, tape_places, tongue_prop
 from unitcad.casting.figures import (
     ADHESIVE_CURE_H,
     DEGASSING_MIN,
@@ -29,7 +29,6 @@ from unitcad.casting.figures import (
     unit_heights,
     window_length,
 )
-from unitcad.casting.preparation import inner
 from unitcad.casting.steps import BenchStep
 from unitcad.casting.views import is_fed_through, picture_path
 from unitcad.catalogue import Material
@@ -39,7 +38,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST
 from unitcad.moulds.plan import Step
 from unitcad.spec import Spec
-from unitcad.text import join_words, number, spaced
+from unitcad.text import number, spaced
 
 TACK = "It is done if a gloved finger comes off clean and a fingernail's dent springs back. If not, wait half an hour"
 """How to tell cured silicone from tacky silicone."""
@@ -279,20 +278,12 @@ def recovery(moulds: MouldSet, layer: int) -> str:
 
 def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
     """Say how an open cup is held down while it is struck off: how many strips of tape, and where they stick."""
-    (left, *others), split = tape_places(moulds), moulds.plan.splits
-    strips = f"{len(others) + 1} strips of tape" if others else "a strip of tape"
-    between = [number(at - left, 2) for at in others[:-1]]
-    where = ": one at either end" if others else ""
-    if between:
-        where += f", {'one' if len(between) == 1 else 'the others'} {join_words(between)} mm from the left one"
-    pieces = ""
-    if split:
-        pieces = " A strip over a seam holds both pieces."
-        if sides := len(side_places(moulds)):
-            count = "a strip" if sides == 1 else f"{sides} strips"
-            pieces += f" The two other sides have {count} each, as the picture shows."
-        if any(map(inner, split)):
-            pieces += " A piece without an outer edge needs none."
+    count, split = len(tape_places(moulds)), moulds.plan.splits
+    strips = "a strip of tape" if count == 1 else f"{count} strips of tape"
+    where = "" if count == 1 else ": one at either end"
+    if count > 2:
+        where += ", the others evenly between them, clear of the filaments"
+    pieces = " Each piece needs one; a strip over a seam holds both." if split else ""
     return BenchStep(
         f"Hold cup {cup} down",
         f"On both sides {'where the filaments come out' if split else 'without a pry slot'} run {strips} "
@@ -458,12 +449,6 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
                 "Lever the base off downwards and straight: a screwdriver in every pry slot, or a blunt spatula at the "
                 "outer edge of a piece that has none. Go round and round, a little at each place, so that no piece "
                 "runs ahead of the next."
-            )
-        if split and inner(split):
-            levered += (
-                " A piece without an outer edge hangs only by the tape. Before you lever, stick more tape across it, "
-                "both ways, clear of the filaments' holes. Let its neighbours get a millimetre ahead at most, and pull "
-                "at the tape under it."
             )
         yield BenchStep(
             "Base off, downwards",

@@ -21,7 +21,6 @@ from unitcad.catalogue import Material
 from unitcad.designs.limits import leaf_mm
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH
 from unitcad.moulds.cup import ribs, window_section
-from unitcad.moulds.cuts import Split
 from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
@@ -119,8 +118,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     else:
         foot = f", elephant foot compensation {number(FOOT_MM, 3)} mm" if _has_foot(moulds) else ""
         low, high = (number(error, 2) for error in FDM_ERROR)
-        sliced = f"{low} to {high} times that by unitcad build {moulds.source} --slice -o sliced"
-        how.append(f"{takes} filament ({sliced}).")
+        how.append(f"{takes} filament (a slicer says {low} to {high} times that).")
         how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
     altered = []
     if lengths.shrinkage_percent:
@@ -338,27 +336,23 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
     (base, *cups), below = plan.splits, called[plan.splits[0].tool]
     upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]
     play = number(base.seams[0].play, 2)
-    grid = any(seam.across == "y" for split in plan.splits for seam in split.seams)
-    numbered = "numbered from the left" + ", row by row from the back" * grid
-    if any(map(inner, plan.splits)):
-        numbered += "; a piece without an outer edge has none"
-    rows = ", one row after the other" * grid
-    around = ", cut out round the filaments' grooves" * bool(grid and plan.of_kind("filament"))
+    first = "left" if base.seams[0].across == "x" else "back"
     text = (
-        f"Printed in pieces: {parts}, {numbered}. Cut off the first layer's bulge along the dovetails. Push each piece "
-        f"straight down onto its neighbour, dovetail into dovetail{rows}, until a fingernail feels no step; scrape "
-        f"dovetails that jam. Seal each seam from outside, never on a face that silicone touches: tape over the "
-        f"underside of the {below}{around} and over the seam's ends"
+        f"Printed in pieces: {parts}, numbered from the {first}. Cut off the first layer's bulge along the "
+        "dovetails. Push each piece straight down onto its neighbour, dovetail into dovetail, until a fingernail feels "
+        "no step; scrape dovetails that jam. Seal each seam from outside, never on a face that silicone touches: tape "
+        f"over the underside of the {below} and over the seam's ends"
     )
     if upper:
         # The pins join the pieces of each cup, except if no unit is between a seam of the base and one of a cup.
         x, y = plan.layout.plate
+        across = base.seams[0].across
+        middles = [cell.x if across == "x" else cell.y for cell in plan.layout.cells]
+        others = [seam.at for cup in cups for seam in cup.seams]
         same = []
         for seam in base.seams if plan.tool(base.tool).kind == "base" else ():
-            middles = [cell.x if seam.across == "x" else cell.y for cell in plan.layout.cells]
-            others = [other.at for cup in cups for other in cup.seams if other.across == seam.across]
             if any(not any(min(seam.at, at) < mid < max(seam.at, at) for mid in middles) for at in others):
-                off, end = (seam.at + x, "left end") if seam.across == "x" else (y - seam.at, "back")
+                off, end = (seam.at + x, "left end") if across == "x" else (y - seam.at, "back")
                 same.append(f"{number(off, 3)} mm from the base's {end}")
         in_line = "The pins hold the pieces of each cup in line"
         if same:
@@ -378,8 +372,3 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         minutes=3.0 * sum(len(split.pieces) - 1 for split in plan.splits),
         required_tools=("wide adhesive tape", *["petroleum jelly"] * bool(upper)),
     )
-
-
-def inner(split: Split) -> bool:
-    """Tell whether a piece is between others on all sides."""
-    return min(split.columns, len(split.pieces) // split.columns) > 2

@@ -55,7 +55,6 @@ __all__ = [
     "choose",
     "materials",
     "measurements",
-    "moduli_by_source",
     "motors",
     "printers",
     "tissue",
@@ -193,23 +192,6 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
                 f"{path}.thickness_mm", float(layer.thickness_mm), "the last layer is a half-space; leave it out"
             )
     return tuple(layers)
-
-
-def moduli_by_source() -> dict[str, dict[str, float]]:
-    """Return Young's modulus (kPa) of the shipped silicones by source, then by name; silicones without one are skipped.
-
-    "paper": as printed; the instrument is quasi-static. "data sheet": static, at 100 %. "tensile, METHOD": slow pulls
-    by others, worked out by each method that could be defended (tensile.toml).
-    """
-    known = materials()
-    sources = {
-        "paper": {name: one.youngs_modulus_kpa.value for name, one in known.items() if one.youngs_modulus_kpa},
-        "data sheet": {name: one.modulus_100pct_kpa.value for name, one in known.items()},
-    }
-    for name, methods in _raw("tensile.toml").items():
-        for method, modulus in methods.items() if isinstance(methods, dict) else ():
-            sources.setdefault(f"tensile, {method}", {})[name] = modulus
-    return sources
 
 
 @cache

@@ -33,7 +33,7 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
     The cells of a layer are compared with each other, then count as one solid.
     """
-    return moulds.once("C200", lambda: [*of_unit(moulds), *_of_pours(moulds)])
+    return [*of_unit(moulds), *_of_pours(moulds)]
 
 
 def of_unit(moulds: MouldSet) -> list[MouldFinding]:

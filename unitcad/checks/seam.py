@@ -7,14 +7,13 @@ pour's silicone can reach, with tape or petroleum jelly under each tool, fills w
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import chain, pairwise
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
-from unitcad.checks.draw import BLOCKED, blocked_area
+from unitcad.checks.draw import BLOCKED, blocked
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
 from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
@@ -29,7 +28,6 @@ WEEP = 0.01
 """Silicone in the seams of a pour, at most, as a share of its layer (assumed): far less than what is mixed over."""
 GRID = 3 / GRID_PER_MM
 """Change of a gap by snapping its two borders to the grid, mm."""
-_Named = tuple[str, Manifold]
 THIN = 1e-3
 """Two heights nearer than this have no slice between them, and nearer borders count as touching, mm."""
 
@@ -80,30 +78,15 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
     if beyond > OVERLAP / 2:
         beyond = sum(float((piece - whole).volume()) for _, piece in pieces)
     yield at_most("C250", f"{split.tool}: pieces beyond it", beyond, OVERLAP, "mm3")
-    for (name, piece), (after, other) in _neighbours(pieces, split.columns):
+    for (name, piece), (after, other) in pairwise(pieces):
         where = f"{name} and {after}"
         yield at_most("C250", f"{where}: overlap", float((piece ^ other).volume()), OVERLAP, "mm3")
         narrowest = float(piece.min_gap(other, least + 1))
         yield at_least("C250", f"{where}: narrowest gap", narrowest, least - GRID, "mm", too_tight(lengths))
-        facing = min(blocked_area(other, piece, (0, 0, way)) for way in (1, -1))
-        yield at_most("C250", f"{where}: slide together", facing, BLOCKED, "mm2", "one piece is caught in the other")
+        caught = min(sum(blocked(other, {name: piece}, (0, 0, way)).values()) for way in (1, -1))
+        yield at_most("C250", f"{where}: slide together", caught, BLOCKED, "mm3", "one piece is caught in the other")
     missing = "something of the tool is missing"
-    _, _, low, _, _, high = whole.bounding_box()
-    spot = Manifold.cylinder(high - low + 2, 2 * play + GRID).translate((0, 0, low - 1))
-    spots = united(spot.translate((x, y, 0)) for x, y in split.crossings)
-    yield at_most("C250", f"{split.tool}: widest gap", _widest(gap - spots), play + GRID, "mm", missing)
-    if split.crossings:
-        # The four corners of a crossing are those of a square, whose diagonal is free.
-        most = math.sqrt(2) * play + GRID
-        yield at_most("C250", f"{split.tool}: widest gap where seams cross", _widest(gap ^ spots), most, "mm", missing)
-
-
-def _neighbours(pieces: Sequence[_Named], columns: int) -> Iterator[tuple[_Named, _Named]]:
-    """Yield each two of the pieces, given row by row, that have a seam or a corner of one between them."""
-    for i, piece in enumerate(pieces):
-        right, left = (i + 1) % columns > 0, i % columns > 0
-        beside = [i + 1] * right + [i + columns - 1] * left + [i + columns] + [i + columns + 1] * right
-        yield from ((piece, pieces[k]) for k in beside if k < len(pieces))
+    yield at_most("C250", f"{split.tool}: widest gap", _widest(gap), play + GRID, "mm", missing)
 
 
 def _widest(gap: Manifold) -> float:
@@ -126,7 +109,7 @@ def _inscribed(section: CrossSection) -> float:
 def _weep(moulds: MouldSet, step: Step, gaps: list[Manifold]) -> MouldFinding:
     """Compare the volume of the gaps that touch the layer, under the rim, with the layer's.
 
-    Each tool's seams are sealed from below: nothing gets from a cup's into the base's at their crossing.
+    Each tool's seams are sealed from below: nothing gets from a cup's into the base's.
     """
     layers = moulds.meshes(step.layer)
     reached = 0.0

@@ -1,6 +1,7 @@
 """C240: any two hollows of a cup have a wall between them: bores, grooves, windows and holes for pins.
 
-Measured on the meshes. Engraved letters don't count: nothing flows through them, and their strokes are closer.
+Measured on the meshes. A hole that breaks into another hollow makes one of the two: C000 counts it, or C100 finds the
+leak. Engraved letters don't count: nothing flows through them, and their strokes are closer.
 """
 
 from __future__ import annotations
@@ -10,9 +11,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.checks.cup_features import GRID, hollows, wall_limit
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
+from unitcad.kernels.mesh import thick_pieces
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.shape.profile import GRID_PER_MM
+
+GRID = 3 / GRID_PER_MM
+"""Wall thickness that snapping two faces to the grid may take, mm."""
 
 SHOWN = 2.0
 """Walls thicker than this times the limit are not told apart."""
@@ -22,16 +29,24 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the thinnest wall between two hollows of every cup."""
     letters = moulds.spec.moulds.engraving_depth_mm + GRID
     for step in moulds.plan.steps:
-        limit = wall_limit(moulds, step)
+        limit, solid = _limit(moulds, step), moulds.solids[moulds.plan.walled(step)]
         farthest = SHOWN * limit
-        pieces = hollows(moulds, moulds.plan.walled(step))
-        deep = [piece for piece in pieces if (box := piece.bounding_box())[5] - box[2] > letters]
+        deep = [
+            piece for piece in thick_pieces(solid.hull() - solid) if (box := piece.bounding_box())[5] - box[2] > letters
+        ]
         thinnest = farthest
         for i, k in near(deep, farthest):
             thinnest = min(thinnest, float(deep[i].min_gap(deep[k], thinnest)))
         yield at_least(
             "C240", f"{moulds.plan.walled(step)}: wall between two hollows", thinnest, limit, "mm", "move them apart"
         )
+
+
+def _limit(moulds: MouldSet, step: Step) -> float:
+    """Return the least wall, mm: the printer's, or a narrower land; under a low rim a groove's floor may be thinner."""
+    lengths = moulds.spec.moulds
+    least = min(lengths.least_wall_mm, lengths.land_mm) - GRID
+    return min(least, step.rim - groove_depth_of(moulds.spec, step.rim) - GRID) if step.groove else least
 
 
 def near(pieces: Sequence[Manifold], gap: float) -> list[tuple[int, int]]:

@@ -44,7 +44,6 @@ from unitcad.pipeline.write import BENCH, PAGE, Built, hold_folder
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.report.read_results import check_casts
-from unitcad.rooms import load
 from unitcad.spec import Spec, assumed_lengths, length_text, read_toml
 from unitcad.spec.custom_code import files_named
 from unitcad.text import join_words, number
@@ -174,10 +173,6 @@ def build(
         ),
     ] = None,
     no_check: NoCheck = False,
-    slicing: Annotated[
-        bool,
-        typer.Option("--slice", help="Compute print time and filament of each piece with PrusaSlicer (slicer.json)."),
-    ] = False,
     watch: Annotated[
         bool, typer.Option("--watch", help="Build again after every save of the spec, until Ctrl-C.")
     ] = False,
@@ -198,18 +193,10 @@ def build(
         """Build the specs and print the results; return whether every check passed."""
         # Every spec is validated before the first one is built.
         wanted = [(load_subject(spec, changes, chosen), _given_paths(spec, changes)) for spec in specs]
-        for spec, _ in wanted if slicing else ():
-            load("unitcad.export.slicer:check_slicing")(spec.unit, chosen)
         results: list[Built] = []
-        printing: list[str] = []
         for spec, given in wanted:
             with progress(spec.name) as say:
                 result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say, given=given)
-                if slicing:
-                    say("slicing")
-                    slice_tools = load("unitcad.export.slicer:slice_tools")
-                    with hold_folder(result.folder):
-                        printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
                 if paged or (result.folder / PAGE).is_file():
                     say("page")
                     with hold_folder(result.folder):
@@ -218,11 +205,10 @@ def build(
         if as_json:
             print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
         else:
-            for i, ((spec, given), result) in enumerate(zip(wanted, results, strict=True)):
+            for (spec, given), result in zip(wanted, results, strict=True):
                 _print_faults(result.manifest)
                 # Standard output has the folder alone, for a script to take.
-                lines = [*_summary(spec, result, given), *printing[i : i + 1]]
-                for line in sorted(lines, key=lambda line: line.startswith("open ")):  # what to open comes last
+                for line in _summary(spec, result, given):
                     warn(f"{spec.name}: {line}")
                 typer.echo(str(result.folder))
         return all(result.ok for result in results)

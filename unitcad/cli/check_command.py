@@ -24,10 +24,8 @@ from unitcad.catalogue import Printer, printers
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
 from unitcad.export import finding_pictures
 from unitcad.files import no_such_file, path_seen_from
-from unitcad.meshcheck import Limits, Options, file_checks, output
-from unitcad.meshcheck import baseline as baselines
+from unitcad.meshcheck import Limits, Options, file_checks
 from unitcad.meshcheck import manifest as listing
-from unitcad.meshcheck.findings import MOST, SHOWN
 from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import check_prefixes
 from unitcad.meshcheck.rules.registry import explain as explanation
@@ -51,7 +49,6 @@ class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, re
     max_faces: Annotated[int, Meta(ge=1)] | None = None
     timeout: Annotated[float, Meta(ge=0.001)] | None = None
     memory: Annotated[int, Meta(ge=200)] | None = None
-    baseline: str | None = None
 
 
 NAMES = ("unitcad.toml", "pyproject.toml")
@@ -76,13 +73,6 @@ class Configuration(Struct, frozen=True, kw_only=True):
     def shown(self) -> str | None:
         """Path of the file from the working directory."""
         return None if self.path is None else path_seen_from(self.path)
-
-    @property
-    def baseline(self) -> Path | None:
-        """Path of the baseline, which the file gives from its own folder."""
-        if self.path is None or self.settings.baseline is None:
-            return None
-        return Path(path_seen_from(self.path.parent / self.settings.baseline))
 
     def ignored(self, path: str) -> list[str]:
         """Return prefixes of codes that per-file-ignores drops for a file; patterns start at the settings' folder."""
@@ -192,9 +182,6 @@ def check(
         list[str] | None,
         typer.Option(metavar="CODES", help="Rules to leave out. Errors that ended a file's check stay."),
     ] = None,
-    extend_select: Annotated[
-        list[str] | None, typer.Option(metavar="CODES", help="Rules in addition to --select.")
-    ] = None,
     fail_on: Annotated[
         str | None,
         typer.Option(metavar="LEVEL", help="Findings that make the exit code 1: error or warning. Default: error."),
@@ -244,28 +231,15 @@ def check(
     memory: Annotated[
         int | None, typer.Option(metavar="MB", min=200, help="Most address space of a process. Default: 8000.")
     ] = None,
-    all_locations: Annotated[
-        bool, typer.Option("--all-locations", help="List every location of a finding, up to 10,000.")
-    ] = False,
-    baseline: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Known findings, which do not fail. Default: none.")
-    ] = None,
-    write_baseline: Annotated[
-        bool, typer.Option("--write-baseline", help="Write the findings to the file of --baseline.")
-    ] = False,
     pictures: Annotated[
         str | None,
-        typer.Option(metavar="DIR", help="Folder for pictures of findings and coloured 3MF files. Default: none."),
+        typer.Option(metavar="DIR", help="Folder for pictures of findings. Default: none."),
     ] = None,
     config: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Settings: a TOML file with a [check] table. Default: the nearest one."),
     ] = None,
     no_config: Annotated[bool, typer.Option("--no-config", help="Read no settings.")] = False,
-    statistics: Annotated[
-        bool,
-        typer.Option("--statistics", help="Count findings by rule; with other formats than text on standard error."),
-    ] = False,
     explain: Annotated[
         list[str] | None,
         typer.Option(metavar="CODES", help="Explain mesh rules and mould checks (C...). No file is checked."),
@@ -292,15 +266,8 @@ def check(
     level = fail_on or settings.fail_on or "error"
     if level not in ("error", "warning"):
         raise unknown_name("--fail-on", level, ("error", "warning"))
-    base = Path(baseline) if baseline is not None else configuration.baseline
-    if write_baseline and base is None:
-        raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
-    if base is not None:
-        known = baselines.read(base) if base.exists() or not write_baseline else baselines.EMPTY
-    selected = check_prefixes(*configuration.chosen("select", _split(select)))
-    extra = check_prefixes("--extend-select", _split(extend_select) or [])
     options = Options(
-        select=selected + extra if selected else (),
+        select=check_prefixes(*configuration.chosen("select", _split(select))),
         ignore=check_prefixes(*configuration.chosen("ignore", _split(ignore))),
         unit=unit_named(*configuration.chosen("unit", unit)),
         printer=_printer(*configuration.chosen("printer", printer)),
@@ -308,7 +275,6 @@ def check(
         strict=bool(settings.strict if strict is None else strict),
         strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
         limits=_limits(max_faces or settings.max_faces, *configuration.chosen("timeout", timeout)),
-        locations=MOST if all_locations or base is not None or pictures is not None else SHOWN,
         draw=pictures is not None,
     )
     for name in files or ():
@@ -344,21 +310,9 @@ def check(
         work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
         compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
         reports = unread + compared + listing.check_unread(listed, [path for path, _ in work], of_path)
-    shown = MOST if all_locations else SHOWN
-    if base is not None:
-        known = baselines.write(base, known, reports) if write_baseline else known
-        reports = [baselines.apply(known, base, report) for report in reports]
-    reports = [report.shortened(shown) for report in reports]
-    table = output.statistics(reports) if statistics else ""
-    used = None if base is None else base.as_posix()
     for format_, path in copies:
-        _save(path, render(reports, format_, level, configuration.shown, used))
-    if statistics and output_format == "text":
-        sys.stdout.write(table)
-    else:
-        written = render(reports, output_format, level, configuration.shown, used)
-        _write(written, plain=output_format == "text")
-        sys.stderr.write(table)
+        _save(path, render(reports, format_, level, configuration.shown))
+    _write(render(reports, output_format, level, configuration.shown), plain=output_format == "text")
     raise typer.Exit(2 if faults else file_checks.worst(reports, level))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
 from typing import Annotated, Any
 
 import typer
@@ -12,10 +10,10 @@ from rich.text import Text
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.catalogue import FREQUENCIES_HZ
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
-from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, with_fit
+from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, finite, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
-from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec
+from unitcad.estimate_inputs import FEM, estimate_spec
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
@@ -73,30 +71,6 @@ def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
         for model in errors["order"]
     ]
     print_table(rows, "leave-one-class-out error")
-
-
-def print_frequencies(data: dict[str, Any]) -> None:
-    """Print a row per frequency: edge level by model; decay of the skin's motion by drive and distance."""
-    rows, own = data["frequencies"], data["variant"]["motor_drive"]
-    drives = (own, "axial" if own == "flat" else "flat")
-    levels: Rows = [{name: level(one, 100) for name, one in row["edge_level"].items()} for row in rows]
-    decay: Rows = [
-        {
-            f"{drive}\n{place.removeprefix('at_').replace('_', ' ')}": f"{100 * one:.3g}"
-            for drive in drives
-            for place, one in row[f"{drive}_over_edge"].items()
-        }
-        for row in rows
-    ]
-    hertz = [f"{row['frequency_hz']:g}" for row in rows]
-    name = data["variant"]["name"]
-    if levels[0]:
-        title = f"{name}: edge level, % of the motor's amplitude"
-        print_table([{"Hz": at, **row} for at, row in zip(hertz, levels, strict=True)], title)
-    if "fit" in data:
-        print_indented(_fit_name(data["fit"]))
-    title = f"{name}: |u| of the skin, % of that at the edge, by mm from the edge; the motor's drive ({own}) first"
-    print_table([{"Hz": at, **row} for at, row in zip(hertz, decay, strict=True)], title)
 
 
 def _fem(block: dict[str, Any]) -> Rows:
@@ -295,9 +269,6 @@ def _format_number(value: float, factor: float, digits: int) -> str:
 _PARTS = ("value", "low", "high")
 
 
-_MOST_FREQUENCIES = 1000
-
-
 def estimate(
     specs: Specs,
     model: Annotated[
@@ -308,11 +279,15 @@ def estimate(
         ),
     ] = "",
     frequency: Annotated[
-        str,
+        float | None,
         typer.Option(
-            metavar="HZ|FROM:TO:STEP", help="One frequency, or a table over frequencies. Default: the motor's."
+            metavar="HZ",
+            min=FREQUENCIES_HZ[0],
+            max=FREQUENCIES_HZ[1],
+            callback=finite,
+            help="Frequency of the drive. Default: the motor's.",
         ),
-    ] = "",
+    ] = None,
     fit: Fit = None,
     sets: Sets = None,
     details: Annotated[
@@ -329,32 +304,22 @@ def estimate(
 
     if model not in ("", "all", *MODELS, FEM):
         raise unknown_name("--model", model, (*MODELS, FEM, "all"))
-    if ":" in frequency and model == FEM:
-        raise Refusal("--frequency", frequency, "must be one frequency for fem, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
-    hertz = frequencies(frequency) if frequency else []
     specs = [confirm_known(name) for name in specs]
     kinds = [kind for kind in map(compound_kind, specs) if kind]
     if kinds:
         if model:
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
-        return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), hertz, details, as_json)
+        return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), frequency, details, as_json)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)
-    if ":" in frequency:
-        estimates = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
-    else:
-        with progress("estimate") as stage:
-            estimates = [estimate_spec(spec, models, hertz[0] if hertz else None, say=stage) for spec in loaded]
+    with progress("estimate") as stage:
+        estimates = [estimate_spec(spec, models, frequency, say=stage) for spec in loaded]
     if as_json:
         print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
         return
 
-    if ":" in frequency:
-        for one in estimates:
-            print_frequencies(one)
-        return
     for one in estimates:
         print_estimate(one, details)
     if details:
@@ -372,40 +337,3 @@ def _warn_of_moulds(spec: Spec) -> None:
         plan(spec)
     except Refusal as refusal:
         warn(f"warning: {spec.name}: its moulds can't be made: {refusal}")
-
-
-def frequencies(text: str) -> list[float]:
-    """Parse HZ, or FROM:TO:STEP with both ends, into a list in Hz. Raises `Refusal`."""
-
-    parts = text.split(":")
-    try:
-        numbers = [float(part) for part in parts]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n > 0 for n in numbers):
-        meant = [float(number) for number in re.findall(r"\d+(?:\.\d+)?", text)][:3]
-        meant += [10.0] * (len(meant) == 2)
-        nearest = ":".join(f"{n:g}" for n in meant) if meant and min(meant) > 0 else "100:150:10"
-        raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", nearest)
-    lowest, highest = FREQUENCIES_HZ
-    clipped = [min(max(n, lowest), highest) for n in numbers[:2]]
-    if clipped != numbers[:2]:
-        nearest = ":".join(f"{n:g}" for n in (*clipped, *numbers[2:]))
-        raise Refusal("--frequency", text, f"must be from {lowest:g} to {highest:g} Hz", nearest)
-    if len(numbers) == 1:
-        return numbers
-    low, high, step = numbers
-    if high < low:
-        raise Refusal("--frequency", text, "TO must not be below FROM", f"{high:g}:{low:g}:{step:g}")
-    least = (high - low) / (_MOST_FREQUENCIES - 1)
-    if step < least * (1 - 1e-9):
-        limit = f"asks for more than {_MOST_FREQUENCIES} frequencies"
-        raise Refusal("--frequency", text, limit, f"{low:g}:{high:g}:{_up(least):g}")
-    count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
-    return [low + i * step for i in range(count)]
-
-
-def _up(number: float) -> float:
-    """Round a number up to six digits."""
-    shown = float(f"{number:.6g}")
-    return shown if shown >= number else float(f"{number * (1 + 1e-5):.6g}")

@@ -1,9 +1,7 @@
 """Pictures of a check's findings, for `unitcad check --pictures`.
 
-For each file with findings a folder with
-
-- a picture a finding (PNG with two views): the whole part with the place named, and the place from near;
-- findings.3mf: its meshes, faces that a finding concerns in the colour of the worst severity.
+For each file with findings a folder with a picture a finding (PNG with two views): the whole part with the place named,
+and the place from near.
 """
 
 from __future__ import annotations
@@ -13,19 +11,18 @@ import io
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from unitcad import files
-from unitcad.export import printing, raster
+from unitcad.export import raster
 from unitcad.export.raster import Colour, Name, Surface
-from unitcad.meshcheck.findings import SEVERITIES, FileReport, Finding, Location
+from unitcad.meshcheck.findings import SHOWN, FileReport, Finding, Location
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, weld_exact
 from unitcad.meshcheck.rules.registry import rules
-from unitcad.text import printable
 
 COLOURS = {"error": (0.86, 0.10, 0.12), "warning": (0.98, 0.58, 0.05), "info": (0.15, 0.45, 0.90)}
 PART = (0.74, 0.79, 0.85)
@@ -55,7 +52,7 @@ class Scene:
 
 
 def write(folder: Path, report: FileReport) -> FileReport:
-    """Write the pictures of a report into a folder of its own below `folder`; the report without its meshes.
+    """Write the pictures of a report into a folder of its own below `folder`; the report as it is without pictures.
 
     A file without findings, or without a mesh that can be drawn, has none. Raises OSError.
     """
@@ -65,8 +62,8 @@ def write(folder: Path, report: FileReport) -> FileReport:
         own.mkdir(parents=True, exist_ok=True)
         for finding in report.findings:
             files.write(own / f"{finding.code}.png", draw(report, finding, scenes))
-        files.write(own / "findings.3mf", colour_3mf(report))
-    return FileReport(report.path, report.findings, report.facts, report.seconds)
+    findings = (replace(item, locations=item.locations[:SHOWN]) for item in report.findings)
+    return FileReport(report.path, tuple(findings), report.facts)
 
 
 def folder_name(path: str) -> str:
@@ -76,26 +73,6 @@ def folder_name(path: str) -> str:
     if name == shown and len(name) <= 80 and not re.match(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\.|$)", name):
         return name
     return f"{name[-80:].strip('._-')}-{hashlib.sha256(os.fsencode(shown)).hexdigest()[:8]}"
-
-
-def colour_3mf(report: FileReport) -> bytes:
-    """Return a 3MF of the report's meshes, faces coloured by the worst severity that concerns them."""
-    parts = []
-    for index, mesh in enumerate(report.meshes):
-        if not len(mesh.faces) or not (np.abs(mesh.vertices) <= LARGEST).all():
-            continue
-        paint = np.zeros(len(mesh.faces), int)
-        for finding in report.findings:
-            for place in finding.locations:
-                if place.mesh == index and place.region is not None:
-                    which = np.asarray(place.region, int)
-                    paint[which] = np.maximum(paint[which], 1 + SEVERITIES.index(finding.severity))
-        a, b, c = mesh.faces.T
-        sound = (a != b) & (b != c) & (c != a)  # 3MF has no triangle with a vertex twice
-        palette = (PART, *(COLOURS[severity] for severity in SEVERITIES))
-        name = " ".join(filter(None, (Path(report.path).name, mesh.name)))
-        parts.append(printing.MeshPart(printable(name), PART, mesh.vertices, mesh.faces[sound], palette, paint[sound]))
-    return printing.content(parts)
 
 
 def draw(report: FileReport, finding: Finding, scenes: Sequence[Scene | None]) -> bytes:

@@ -139,16 +139,14 @@ _RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 class MeshPart:
     """A named mesh in print attitude: vertices (n, 3) float32 in mm, faces (m, 3), colour as three numbers 0 to 1.
 
-    Faces of several colours have a `palette`, of which `paint` (m,) is each face's index. `copies`: the names of
-    several that are alike; the mesh is in the file once, and each has an item of the build, its name as part number.
+    `copies`: the names of several that are alike; the mesh is in the file once, and each has an item of the build, its
+    name as part number.
     """
 
     name: str
     colour: tuple[float, float, float]
     vertices: np.ndarray
     faces: np.ndarray
-    palette: tuple[tuple[float, float, float], ...] = ()
-    paint: np.ndarray | None = None
     copies: tuple[str, ...] = ()
 
 
@@ -234,45 +232,30 @@ def _model(
         "<resources>",
         '<basematerials id="1">',
         *(
-            f"<base name={xml_attribute(part.name)} displaycolor={xml_attribute(colour_hex(colour))}/>"
+            f"<base name={xml_attribute(part.name)} displaycolor={xml_attribute(colour_hex(part.colour))}/>"
             for part in parts
-            for colour in part.palette or (part.colour,)
         ),
         "</basematerials>",
     ]
-    base = 0
     for index, part in enumerate(parts):
         lines += [
-            f'<object id="{index + 2}" type="model" name={xml_attribute(part.name)} pid="1" pindex="{base}">',
+            f'<object id="{index + 2}" type="model" name={xml_attribute(part.name)} pid="1" pindex="{index}">',
             "<mesh>",
             "<vertices>",
             *_rows('<vertex x="%s" y="%s" z="%s"/>', np.asarray(part.vertices, np.float32).astype(str)),
             "</vertices>",
             "<triangles>",
-            *_triangles(part, base),
+            *_rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces),
             "</triangles>",
             "</mesh>",
             "</object>",
         ]
-        base += len(part.palette) or 1
     lines += ["</resources>", "<build>"]
     for (index, copy), (x, y) in zip(built, places, strict=True):
         move = " ".join(f"{value + 0.0:.6f}" for value in (x, y, 0.0) - low[index])
         named = f" partnumber={xml_attribute(copy)}" if copy else ""
         lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"{named}/>')
     return "\n".join([*lines, "</build>", "</model>", ""])
-
-
-def _triangles(part: MeshPart, base: int) -> list[str]:
-    """Write the faces; those of another colour than the palette's first one name theirs."""
-    if part.paint is None:
-        return _rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces)
-    return [
-        f'<triangle v1="{a}" v2="{b}" v3="{c}"/>'
-        if not colour
-        else f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="1" p1="{base + colour}"/>'
-        for (a, b, c), colour in zip(part.faces.tolist(), part.paint.tolist(), strict=True)
-    ]
 
 
 def _rows(form: str, table: np.ndarray) -> list[str]:

@@ -195,10 +195,7 @@ def _below(solid: Manifold, bottom: float) -> Manifold:
     """Return the volume under the upward faces of `solid`, down to `bottom`: a prism a patch of faces that join."""
     vertices, faces = arrays(solid)
     vertices = _plumb(vertices)
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # By slope: a sliver of a level face that was left out would part the face, and leave a crack between two prisms.
-    faces = faces[normals[:, 2] > _UPRIGHT * np.linalg.norm(normals, axis=1)]
+    faces = _upward(vertices, faces)
     patches, corners = _patches(faces), vertices[np.unique(faces), :2]
     plain = [_prism(vertices, patch, bottom) for patch in patches]
     split = [_prism(*_split_at_lines(vertices, patch, corners), bottom) for patch in patches]
@@ -206,6 +203,21 @@ def _below(solid: Manifold, bottom: float) -> Manifold:
     # since a boolean of many that is worked out in parts comes out in other triangles.
     cracked = _joined(plain).surface_area() > _joined(split).surface_area() + _CRACK
     return _joined(split if cracked else plain)
+
+
+def swept_up(solid: Manifold, top: float) -> Manifold:
+    """Return the volume over the upward faces of `solid`, up to z = `top`, which is above it."""
+    vertices, faces = arrays(solid)
+    turned = vertices * (1.0, 1.0, -1.0)
+    prisms = (_prism(turned, patch, -top) for patch in _patches(_upward(vertices, faces)))
+    return _joined([prism.mirror((0, 0, 1)) for prism in prisms])
+
+
+def _upward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the upward faces, by slope: without a sliver of a level face two prisms would have a crack between."""
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return faces[normals[:, 2] > _UPRIGHT * np.linalg.norm(normals, axis=1)]
 
 
 def _joined(prisms: list[Manifold]) -> Manifold:

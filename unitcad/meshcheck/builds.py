@@ -17,7 +17,7 @@ from manifold3d import Manifold
 
 from unitcad.geometry.arrays import Floats, cross, extent
 from unitcad.geometry.boxes import box_pairs
-from unitcad.meshcheck.findings import Facts, Finding, Location, counted, detail, ending, number, point
+from unitcad.meshcheck.findings import Facts, Finding, Location, counted, drawn_meshes, ending, number, point
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_step, representable, solid_of, weld_exact
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
 from unitcad.meshcheck.readers import threemf_schema as schema
@@ -97,8 +97,8 @@ class CheckedMesh:
     inspection: Inspection | None = None
 
 
-def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict: bool = False) -> CheckedMesh:
-    """Apply the rules that need no printer; `cross` and `strict` are those of `Inspection`."""
+def check_surface(mesh: Mesh, deadline: Deadline, *, strict: bool = False) -> CheckedMesh:
+    """Apply the rules that need no printer; `strict` is that of `Inspection`."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
     points = representable(mesh.vertices)
     # What was made 0 may be where another vertex is.
@@ -107,11 +107,11 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
         return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
         return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
-    low, high = extent(mesh.vertices[np.unique(mesh.faces)] if mesh.indexed else mesh.vertices)
+    low, high = extent(mesh.vertices[mesh.faces.reshape(-1)] if mesh.indexed else mesh.vertices)
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, cross, strict=strict)
+        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, strict=strict)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
@@ -140,7 +140,7 @@ def check_assembly(mesh: Mesh, deadline: Deadline, *, strict: bool = False) -> C
             return None
         solids.append(Solid(object, checked.facts.volume_mm3, source.object(start) or f"object {len(solids) + 1}"))
         facts.append(checked.facts)
-    low, high = extent(mesh.vertices[np.unique(mesh.faces)])
+    low, high = extent(mesh.vertices[mesh.faces.reshape(-1)])
     whole = Facts(
         triangles=len(mesh.faces),
         vertices=len(mesh.vertices),
@@ -169,29 +169,24 @@ def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:
 
 def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     """Return the findings with each location's faces as the file has them, and their line and object where known."""
-    meshes = detail().meshes
+    meshes = drawn_meshes()
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)
     return tuple(
-        replace(item, locations=tuple(_with_file_places(_with_middle(place, mesh), mesh) for place in item.locations))
+        replace(item, locations=tuple(_with_file_places(_drawn(place, mesh), mesh) for place in item.locations))
         for item in findings
     )
 
 
-def _with_middle(place: Location, mesh: Mesh) -> Location:
-    """Return the location with the middle of its triangles and, where findings are drawn, the number of their mesh."""
-    if place.mesh is not None or (place.centre is not None and place.region is None):
+def _drawn(place: Location, mesh: Mesh) -> Location:
+    """Return the location with its triangles and the number of their mesh where findings are drawn."""
+    meshes = drawn_meshes()
+    if place.mesh is not None or meshes is None:
         return place
-    whole, meshes = place.region is not None, detail().meshes
-    region = place.region if whole else np.array(place.faces, np.int64)
-    centre = place.centre or place.xyz
-    if place.centre is None and len(region) and (whole or len(region) > 1 or centre is None):
-        low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
-        centre = point((low + high) / 2)
-    if meshes is None or (not len(region) and centre is None):
-        return replace(place, region=None, centre=centre)
-    number = next(i for i, known in enumerate(meshes) if known is mesh)
-    return replace(place, region=region, mesh=number, centre=centre)
+    region = place.region if place.region is not None else np.array(place.faces, np.int64)
+    if not len(region) and place.xyz is None:
+        return place
+    return replace(place, region=region, mesh=next(i for i, known in enumerate(meshes) if known is mesh))
 
 
 def _with_file_places(place: Location, mesh: Mesh) -> Location:
@@ -258,7 +253,7 @@ def _measure_turned(instance: Instance) -> _Turned:
         corners = instance.triangles.rows[:, :3]
         a, b, c = (points[corner] for corner in corners.T)
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
-        return _Turned(np.stack(extent(points[np.unique(corners)])), area, abs(float(np.linalg.det(linear))))
+        return _Turned(np.stack(extent(np.concatenate([a, b, c]))), area, abs(float(np.linalg.det(linear))))
 
 
 def _geometry(
@@ -300,14 +295,13 @@ def _geometry(
         bbox_mm=(point(corners[:, 0].min(axis=0)), point(corners[:, 1].max(axis=0))),
         watertight=all(facts.watertight for facts, _ in each),
     )
-    if options.cross:
-        solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
-        sound = (
-            Solid(instance.mesh(placed=True), volume, str(instance.object.id))
-            for instance, volume in compress(zip(instances, volumes, strict=True), solids)
-        )
-        with keeping(change=_filled):
-            findings += _filled(overlapping(sound, "instances", deadline))
+    solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
+    sound = (
+        Solid(instance.mesh(placed=True), volume, str(instance.object.id))
+        for instance, volume in compress(zip(instances, volumes, strict=True), solids)
+    )
+    with keeping(change=_filled):
+        findings += _filled(overlapping(sound, "instances", deadline))
     findings += s_scale.likely_unit(whole, build.unit)
     findings += g_shells.expected(whole.shells, options.shells)
     if options.printer is not None:
@@ -322,7 +316,7 @@ def _check_object(instance: Instance, options: Options, deadline: Deadline) -> C
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     judged = partial(_filled, strict=options.strict_3mf)
     with keeping(change=judged):
-        checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+        checked = check_surface(mesh, deadline, strict=options.strict)
     return replace(checked, findings=tuple(judged(checked.findings)))
 
 
@@ -400,8 +394,7 @@ def _by_mesh(step: Measured, options: Options, deadline: Deadline) -> Iterator[F
     if opened:
         text = f"{counted(opened, 'solid')} without a closed mesh; overlap (G002) and printability (D) are not judged"
         yield F012.finding(f"OCCT makes {text}", opened, severity="warning")
-    if options.cross:
-        yield from overlapping(solids, "solids", deadline, thick=2 * step.tolerance)
+    yield from overlapping(solids, "solids", deadline, thick=2 * step.tolerance)
     if options.printer is not None and step.meshes:
         whole = _mesh(step.meshes)
         part = Inspection(whole, topology_of(whole, deadline.tick), deadline.tick)

@@ -11,7 +11,6 @@ import os
 import signal
 import stat
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -23,7 +22,7 @@ from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.builds import CheckedMesh, check_3mf, check_assembly, check_on_bed, check_step, check_surface
-from unitcad.meshcheck.findings import Facts, FileReport, Finding, ending, limit_details, merge
+from unitcad.meshcheck.findings import Facts, FileReport, Finding, drawing, ending, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers import kind_of
 from unitcad.meshcheck.readers.read_step import missing
@@ -120,7 +119,7 @@ def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileR
 
 def _check_with(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
     meshes: list[Mesh] | None = [] if options.draw else None
-    with limit_details(options.locations, meshes):
+    with drawing(meshes):
         try:
             with keeping():
                 findings, facts = work(Deadline(options.limits.seconds))
@@ -160,7 +159,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     if factor != 1.0:
         mesh = replace(mesh, vertices=mesh.vertices * factor)
     with keeping(findings):
-        whole = check_assembly(mesh, deadline, strict=options.strict) if kind == "glb" and options.cross else None
+        whole = check_assembly(mesh, deadline, strict=options.strict) if kind == "glb" else None
         more, facts = _check_surface(mesh, options, deadline, whole)
     return findings + more, facts
 
@@ -184,7 +183,7 @@ def _check_surface(
     mesh: Mesh, options: Options, deadline: Deadline, checked: CheckedMesh | None = None
 ) -> tuple[list[Finding], Facts]:
     """Check the mesh of a file that has no instances; `checked`: its surface, if that is done."""
-    checked = checked or check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+    checked = checked or check_surface(mesh, deadline, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
         with keeping(findings, facts):
@@ -276,7 +275,6 @@ def check_files(
 
 def check_guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
     """Call `check_file` with an alarm behind its clock; an inner fault becomes a finding, not a crash."""
-    begin = time.perf_counter()
     try:
         with _alarm(options.limits.seconds):
             report = check_file(path, options)
@@ -290,7 +288,6 @@ def check_guarded(path: str, options: Options, then: Then | None = None) -> File
         report = _report_stop(
             path, f"the check itself failed ({type(error).__name__}: {error}); please report the file"
         )
-    report = replace(report, seconds=time.perf_counter() - begin)
     return then(report) if then else report
 
 

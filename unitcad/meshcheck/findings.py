@@ -14,36 +14,30 @@ from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.text import number
 
 SHOWN = 5
-"""Locations of a finding unless more are asked for; its count says how many there are."""
-MOST = 10_000
-"""Locations of a finding that are kept if all are requested."""
+"""Locations of a finding; its count says how many there are."""
+_DRAWN = 10_000
+"""Locations of a finding that are drawn."""
+_MESHES: ContextVar[list[Mesh] | None] = ContextVar("meshes", default=None)
 
 
-@dataclass(frozen=True)
-class Detail:
-    """`locations` a finding; `meshes`: the list that collects meshes with a finding, None if they are not drawn."""
-
-    locations: int = SHOWN
-    meshes: list[Mesh] | None = None
+def drawn_meshes() -> list[Mesh] | None:
+    """Return the list that collects the meshes with a finding, None if findings are not drawn."""
+    return _MESHES.get()
 
 
-_DEFAULT = Detail()
-_DETAIL: ContextVar[Detail] = ContextVar("detail", default=_DEFAULT)
-
-
-def detail() -> Detail:
-    """Return the current limits of locations and meshes."""
-    return _DETAIL.get()
+def most_locations() -> int:
+    """Return how many locations of a finding are kept."""
+    return SHOWN if drawn_meshes() is None else _DRAWN
 
 
 @contextlib.contextmanager
-def limit_details(locations: int, meshes: list[Mesh] | None = None) -> Iterator[None]:
-    """Keep at most `locations` locations a finding, and meshes if a list is given, until the block ends."""
-    before = _DETAIL.set(Detail(locations, meshes))
+def drawing(meshes: list[Mesh] | None) -> Iterator[None]:
+    """Collect meshes, and keep more locations, if there is a list, until the block ends."""
+    before = _MESHES.set(meshes)
     try:
         yield
     finally:
-        _DETAIL.reset(before)
+        _MESHES.reset(before)
 
 
 SEVERITIES = ("info", "warning", "error")
@@ -71,9 +65,8 @@ class Location:
 
     A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
-    `line` is that of the first face if the format has lines, otherwise that of the fault. `centre`: of the box round
-    the faces, the same in whatever order they are, mm. `region`, for pictures: its triangles in the mesh of number
-    `mesh`.
+    `line` is that of the first face if the format has lines, otherwise that of the fault. `region`, for pictures: its
+    triangles in the mesh of number `mesh`.
     """
 
     face: int | None = None
@@ -84,7 +77,6 @@ class Location:
     faces: tuple[int, ...] = ()
     region: Any = field(default=None, compare=False, repr=False)
     mesh: int | None = field(default=None, compare=False, repr=False)
-    centre: Point | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.faces and self.face is None:
@@ -126,8 +118,7 @@ class Location:
 class Finding:
     """One rule that a file breaks: how often, and its first places.
 
-    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it. `known`: a baseline
-    lists it, and it does not fail.
+    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it.
     """
 
     code: str
@@ -136,7 +127,6 @@ class Finding:
     count: int = 1
     locations: tuple[Location, ...] = ()
     ends: bool = False
-    known: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return it JSON-ready."""
@@ -168,7 +158,7 @@ class Facts:
 
 @dataclass(frozen=True, repr=False)
 class FileReport:
-    """A file's findings, sorted by severity and code, its facts, and the wall time that the check took, if known.
+    """A file's findings, sorted by severity and code, and its facts.
 
     `meshes`: those that the locations number, if `Options.draw` is set.
     """
@@ -176,13 +166,12 @@ class FileReport:
     path: str
     findings: tuple[Finding, ...] = ()
     facts: Facts = field(default_factory=Facts)
-    seconds: float | None = field(default=None, compare=False)
     meshes: tuple[Mesh, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def verdict(self) -> str:
-        """`error`, `warning` or `pass`: the worst finding, infos and known ones aside."""
-        severities = {finding.severity for finding in self.findings if not finding.known}
+        """`error`, `warning` or `pass`: the worst finding, infos aside."""
+        severities = {finding.severity for finding in self.findings}
         return "error" if "error" in severities else "warning" if "warning" in severities else "pass"
 
     def __repr__(self) -> str:
@@ -194,13 +183,8 @@ class FileReport:
         """Return whether a finding of that code is there."""
         return any(finding.code == code for finding in self.findings)
 
-    def shortened(self, locations: int) -> FileReport:
-        """Return the report with at most `locations` locations a finding; the rest are counted."""
-        kept = tuple(replace(item, locations=item.locations[:locations]) for item in self.findings)
-        return replace(self, findings=kept)
-
     def as_dict(self) -> dict[str, Any]:
-        """Return it JSON-ready; without the time, so that the same file gives the same text."""
+        """Return it JSON-ready."""
         return {
             "path": self.path,
             "verdict": self.verdict,
@@ -262,6 +246,6 @@ def _together(alike: list[Finding]) -> Finding:
         max((finding.severity for finding in alike), key=SEVERITIES.index),
         f"{message} ({count} in all)" if len(alike) > 1 else message,
         count,
-        tuple(islice(chain.from_iterable(finding.locations for finding in alike), detail().locations)),
+        tuple(islice(chain.from_iterable(finding.locations for finding in alike), most_locations())),
         any(finding.ends for finding in alike),
     )

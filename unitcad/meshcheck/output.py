@@ -28,8 +28,7 @@ def write_text(reports: Sequence[FileReport], fail_on: str) -> str:
     codes: set[str] = set()
     for report in reports:
         for finding in report.findings:
-            if not finding.known:
-                codes.add(finding.code)
+            codes.add(finding.code)
             lines.append(finding_line(report, finding))
         if report.verdict == "pass" and (size := _size(report.facts)):
             lines.append(f"{printable(report.path)}: passed: {size}")
@@ -41,8 +40,7 @@ def write_text(reports: Sequence[FileReport], fail_on: str) -> str:
 
 def finding_line(report: FileReport, finding: Finding) -> str:
     """Return a finding in one line: file, code, severity, message and its first places."""
-    known = " (known)" if finding.known else ""
-    return f"{printable(report.path)}: {finding.code} {finding.severity}{known}: {printable(with_places(finding, 3))}"
+    return f"{printable(report.path)}: {finding.code} {finding.severity}: {printable(with_places(finding, 3))}"
 
 
 _EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
@@ -69,40 +67,17 @@ def summary(reports: Sequence[FileReport], fail_on: str) -> str:
     warned = "failed by a warning (--fail-on warning)" if fail_on == "warning" else "warned"
     parts = [f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", warned)) if verdicts[name]]
     parts.append(f"{verdicts['pass']} passed")
-    if known := sum(finding.known for report in reports for finding in report.findings):
-        parts.append(counted(known, "known finding"))
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
-
-
-def statistics(reports: Sequence[FileReport]) -> str:
-    """Return how many files each rule hit and how often, most files first.
-
-    A finding that counts bytes is one occurrence.
-    """
-    files: Counter[str] = Counter()
-    times: Counter[str] = Counter()
-    for report in reports:
-        for finding in report.findings:
-            files[finding.code] += 1
-            times[finding.code] += 1 if rules()[finding.code].count_is_size else finding.count
-    lines = [
-        f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
-        for code, n in files.most_common()
-    ]
-    return "\n".join(lines) + "\n" if lines else "no findings\n"
 
 
 _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
 def write_github(reports: Sequence[FileReport], fail_on: str) -> str:
-    """Write workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
+    """Write workflow commands: an annotation a finding, then a line for the log that counts."""
     lines = []
     for report in reports:
         for finding in report.findings:
-            if finding.known:
-                lines.append(f"known: {finding_line(report, finding)}")
-                continue
             title = f"{finding.code} {rules()[finding.code].title}"
             first = first_line(finding)
             where = f"file={_property(report.path)}" + (f",line={first}" if first is not None else "")
@@ -130,14 +105,14 @@ _MARKS = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_[]|~#$@!"} | {"<": "
 def write_markdown(reports: Sequence[FileReport], fail_on: str) -> str:
     """Write how many files failed, a table of all findings, the worst first, and how to fix them."""
     found = [(report, finding) for report in reports for finding in report.findings]
-    found.sort(key=lambda pair: (pair[1].known, -SEVERITIES.index(pair[1].severity)))
+    found.sort(key=lambda pair: -SEVERITIES.index(pair[1].severity))
     lines = ["## unitcad check", "", f"{summary(reports, fail_on)}."]
     if found:
         lines += ["", "| | file | rule | finding |", "| --- | --- | --- | --- |"]
         lines += [_row(report, finding) for report, finding in found[:MOST_ROWS]]
     if len(found) > MOST_ROWS:
         lines += ["", f"{len(found) - MOST_ROWS:,} more findings are in the log."]
-    codes = {finding.code for _, finding in found if not finding.known}
+    codes = {finding.code for _, finding in found}
     if codes:
         lines += ["", "How to fix:", ""]
         lines += [
@@ -147,9 +122,8 @@ def write_markdown(reports: Sequence[FileReport], fail_on: str) -> str:
 
 
 def _row(report: FileReport, finding: Finding) -> str:
-    severity = "known" if finding.known else finding.severity
     rule = f"{finding.code} {rules()[finding.code].title}"
-    return f"| {severity} | {_plain(report.path)} | {_plain(rule)} | {_plain(with_places(finding, 3))} |"
+    return f"| {finding.severity} | {_plain(report.path)} | {_plain(rule)} | {_plain(with_places(finding, 3))} |"
 
 
 def _plain(text: str) -> str:
@@ -159,68 +133,38 @@ def _plain(text: str) -> str:
     return shown.translate(_MARKS)
 
 
-def json_report(
-    reports: Sequence[FileReport], config: str | None = None, baseline: str | None = None
-) -> dict[str, Any]:
-    """Return the JSON object: {files: [{path, verdict, findings, facts}], config, baseline}.
-
-    A finding also says how to fix it, and whether the baseline lists it.
-    """
-    return {"files": [_entry(report) for report in reports], "config": config, "baseline": baseline}
+def json_report(reports: Sequence[FileReport], config: str | None = None) -> dict[str, Any]:
+    """Return the JSON object: {files: [{path, verdict, findings, facts}], config}; a finding also has its fix."""
+    return {"files": [_entry(report) for report in reports], "config": config}
 
 
 def _entry(report: FileReport) -> dict[str, Any]:
     entry = report.as_dict()
     for shown, finding in zip(entry["findings"], report.findings, strict=True):
-        shown |= {"fix": rules()[finding.code].fix, "known": finding.known}
+        shown["fix"] = rules()[finding.code].fix
     return entry
 
 
 def write_junit(reports: Sequence[FileReport], fail_on: str) -> str:
-    """Write JUnit XML: a test case a file, a failure a finding at or above `fail_on`, the others in system-out."""
+    """Write JUnit XML: a test case a file, a failure a finding at or above `fail_on`."""
     least = SEVERITIES.index(fail_on)
     cases, failed = [], 0
     for report in reports:
-        bad = [
-            finding for finding in report.findings if not finding.known and SEVERITIES.index(finding.severity) >= least
-        ]
-        rest = [finding for finding in report.findings if finding not in bad]
-        failed += bool(bad)
-        inner = "".join(_failure(finding) for finding in bad)
-        if rest:
-            others = "\n".join(
-                f"{item.code} {item.severity}{' (known)' if item.known else ''}: {with_places(item, 3)}"
-                for item in rest
-            )
-            inner += f"<system-out>{xml_text(_xml(others))}</system-out>"
-        name = f"name={xml_attribute(_xml(report.path))}" + _time(report.seconds)
-        cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
-    known = [report.seconds for report in reports if report.seconds is not None]
-    total = sum(known) if known else None
-    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0"{_time(total)}>'
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        + "\n".join([f"<testsuites>{head}", *cases])
-        + ("\n</testsuite></testsuites>\n")
-    )
-
-
-def _time(seconds: float | None) -> str:
-    return "" if seconds is None else f' time="{seconds:.3f}"'
+        failures = [_failure(item) for item in report.findings if SEVERITIES.index(item.severity) >= least]
+        failed += bool(failures)
+        name = xml_attribute(printable(report.path))
+        cases.append(f'<testcase classname="unitcad.check" name={name}>{"".join(failures)}</testcase>')
+    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0">'
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f"<testsuites>{head}", *cases, "</testsuite></testsuites>", ""]
+    return "\n".join(lines)
 
 
 def _failure(finding: Finding) -> str:
     rule = rules()[finding.code]
     places = [f"at {text}" for place in finding.locations if (text := str(place))]
-    body = "\n".join([f"{finding.code} {rule.title}: {finding.message}", *places, f"Fix: {rule.fix}"])
-    head = f"type={xml_attribute(finding.code)} message={xml_attribute(_xml(with_places(finding, 3)))}"
-    return f"<failure {head}>{xml_text(_xml(body))}</failure>"
-
-
-def _xml(text: str) -> str:
-    """Replace the characters that XML 1.0 cannot hold."""
-    return "".join(c if c in "\t\n\r" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff")
-                   else "\ufffd" for c in text)  # fmt: skip
+    lines = [f"{finding.code} {rule.title}: {finding.message}", *places, f"Fix: {rule.fix}"]
+    head = f"type={xml_attribute(finding.code)} message={xml_attribute(printable(with_places(finding, 3)))}"
+    return f"<failure {head}>{xml_text(chr(10).join(map(printable, lines)))}</failure>"
 
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -228,10 +172,7 @@ _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def sarif_log(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only.
-
-    Findings of the baseline are `unchanged`, and suppressed.
-    """
+    """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only."""
     index = {code: i for i, code in enumerate(rules())}
     return {
         "$schema": SCHEMA,
@@ -275,7 +216,6 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
     objects = dict.fromkeys(place.object for place in finding.locations if place.object)
     logical = {"logicalLocations": [{"name": name, "kind": "object"} for name in objects]} if objects else {}
     fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{finding.code}".encode()).hexdigest()
-    known = {"baselineState": "unchanged", "suppressions": [{"kind": "external"}]} if finding.known else {}
     return {
         "ruleId": finding.code,
         "ruleIndex": index[finding.code],
@@ -284,7 +224,6 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
         "locations": [{"physicalLocation": physical, **logical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": finding.count, "places": [place.as_dict() for place in finding.locations]},
-        **known,
     }
 
 
@@ -305,19 +244,10 @@ def _uri(path: str) -> str:
 FORMATS = ("text", "json", "github", "sarif", "junit", "markdown")
 
 
-def render(
-    reports: Sequence[FileReport],
-    format_: str,
-    fail_on: str = "error",
-    config: str | None = None,
-    baseline: str | None = None,
-) -> str:
-    """Return all reports in one of FORMATS, ending in a newline.
-
-    JSON names `config` and `baseline`, the files of settings and of known findings.
-    """
+def render(reports: Sequence[FileReport], format_: str, fail_on: str = "error", config: str | None = None) -> str:
+    """Return all reports in one of FORMATS, ending in a newline; JSON names `config`, the file of settings."""
     if format_ == "json":
-        written = _dump(json_report(reports, config, baseline))
+        written = _dump(json_report(reports, config))
     elif format_ == "sarif":
         written = _dump(sarif_log(reports))
     else:

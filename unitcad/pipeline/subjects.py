@@ -56,11 +56,11 @@ class Compound(Subject):
         cls,
         names: Sequence[str],
         sets: Sequence[str],
-        hertz: Sequence[float],
+        hertz: float | None,
         details: bool,
         as_json: bool,
     ) -> None:
-        """Print the estimate of one or several. `hertz`: one frequency, or a band. Raises Refusal."""
+        """Print the estimate of one or several. `hertz`: the drive's frequency; None: the motor's. Raises Refusal."""
 
     @abstractmethod
     def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:

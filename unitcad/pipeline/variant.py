@@ -99,21 +99,21 @@ class Variant(MouldSet):
 
     def to_build123d(self) -> Any:
         """Return unit and moulds as a named, coloured build123d Compound, mm. Raises UnitcadError without the extra."""
-        from unitcad.kernels import build123d
+        from unitcad.kernels import native
 
-        return build123d.compound((*self.bodies.values(),))
+        return native.build123d_compound((*self.bodies.values(),))
 
     def to_cadquery(self) -> Any:
         """Return unit and moulds as a named, coloured CadQuery Assembly, mm. Raises UnitcadError without the extra."""
-        from unitcad.kernels import cadquery
+        from unitcad.kernels import native
 
-        return cadquery.assembly((*self.bodies.values(),))
+        return native.cadquery_assembly((*self.bodies.values(),))
 
     def show(self) -> None:
         """Show unit and moulds, named and coloured, in ocp-vscode or YACV. Raises UnitcadError without either."""
-        from unitcad.kernels import build123d
+        from unitcad.kernels import native
 
-        build123d.show(self.to_build123d())
+        native.show(self.to_build123d())
 
     def section(self) -> str:
         """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""

@@ -30,10 +30,6 @@ PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
 BENCH = "bench.html"
 """The bench page of a variant's procedure, next to the page."""
-ADDRESS = "store.json"
-"""File of a batch that names its store, if that is not its own."""
-STORE = "store"
-"""Folder of a batch's own store."""
 TRIES = 5
 """How often a result is made when content that it shares vanishes from the cache meanwhile."""
 

@@ -150,7 +150,6 @@ def write_bench(folder: Path) -> Path | None:
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
         "measured_mm": MEASURED_MM,
         "pictures": step_pictures(folder, _paths(casting)),
-        "slicer": _slicer(folder),
     }
     target = folder / BENCH
     text = html_page(content, f"{casting.name}: bench", PROGRAMS, STYLES, (), "Without a script, read casting.md.")
@@ -181,12 +180,3 @@ def _hash(folder: Path) -> str:
 def _paths(casting: CastingFile) -> list[str]:
     steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
     return [step.picture for step in (*steps, *casting.release, *casting.assembly)]
-
-
-def _slicer(folder: Path) -> dict[str, Any] | None:
-    """Return print time and filament by the slicer, if they are known."""
-    try:
-        sliced = files.read_json(folder / "slicer.json", links=False)
-        return {"slicer": str(sliced["slicer"]), **{key: float(sliced[key]) for key in ("print_s", "filament_cm3")}}
-    except (UnitcadError, KeyError, TypeError, ValueError):
-        return None

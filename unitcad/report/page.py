@@ -139,15 +139,13 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
             records.append(record)
             specs.append(spec)
         of_variants = {name: why for name, why in damaged.items() if name not in read_results.BATCH_TABLES}
-        table = read_results.results_table(batch, records, of_variants, stored=read_results.keeps_store(folder))
+        table = read_results.results_table(batch, records, of_variants)
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {counted(len(table.rows), 'variant')}"
     models = _models(records, specs, modelled) if modelled else {}
     pool = Pool()
     data = {
         "title": title,
         "version": __version__,
-        # How a variant's folder is made is said with it.
-        **({"stored_in": folder.resolve().name} if table and read_results.keeps_store(folder) else {}),
         "variants": [[record.folder, pool.put(record.as_dict())] for record in records],
         "table": structs.asdict(table) if table else None,
         "estimate": _of_all(batch, records),

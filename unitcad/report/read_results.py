@@ -25,7 +25,7 @@ from unitcad.files import TEMPORARY
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import GEOMETRIC, build_key
-from unitcad.pipeline.write import ADDRESS, PAGE, STORE
+from unitcad.pipeline.write import PAGE
 from unitcad.report.html_page import REFERENCE
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, read_toml, to_data, with_formats
@@ -76,7 +76,6 @@ class VariantRecord(Struct, kw_only=True):
     manifest: Manifest
     estimate: dict[str, Any] | None
     casting: dict[str, Any] | None
-    slicer: dict[str, Any] | None
     drawings: dict[str, str]
     pictures: dict[str, str]
     casts: list[dict[str, Any]]
@@ -171,7 +170,7 @@ def rows_of_csv(folder: Path) -> int | None:
 
 
 MANIFEST = "manifest.json"
-TABLES = ("estimate", "casting", "slicer")
+TABLES = ("estimate", "casting")
 """JSON files of a variant that the page shows, without their ending."""
 TIMINGS = "timings.json"
 """Left out of the page: the duration of a build differs from run to run."""
@@ -300,18 +299,11 @@ def _drawing(path: Path) -> str:
     return files.read_text(path, largest=LARGEST_DRAWING, links=False)
 
 
-def keeps_store(folder: Path) -> bool:
-    """Tell whether a batch keeps its variants in a store, from which their folders can be made."""
-    return (folder / STORE).is_dir() or (folder / ADDRESS).is_file()
-
-
-def results_table(
-    batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str], *, stored: bool = False
-) -> ResultsTable:
+def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str]) -> ResultsTable:
     """Return a batch's table, as `batch` (its batch.json) lists it, else from the manifests.
 
     Chosen values come first, then the levels at the edge, then the rest. `damaged` says by folder why a result
-    can't be read; `stored`: variants without a folder are in a store.
+    can't be read.
     """
     if batch:
         entries, columns = batch["variants"], [name for name in batch["columns"] if name != "folder"]
@@ -329,13 +321,8 @@ def results_table(
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
     swept = _swept(columns)
     columns = _in_order(columns, swept)
-    there = {each.folder for each in variants}
-
-    def opened(entry: dict[str, Any]) -> str:
-        folder = entry.get("folder") or ""
-        return folder if folder in there or (stored and entry.get("status") == "ok") else ""
-
-    rows = [[opened(entry), *(_cell(entry.get(c)) for c in columns)] for entry in entries]
+    there = {each.folder: each.folder for each in variants}
+    rows = [[there.get(entry.get("folder") or "", ""), *(_cell(entry.get(c)) for c in columns)] for entry in entries]
     return ResultsTable(columns, rows, [name for name in columns if name in swept])
 
 

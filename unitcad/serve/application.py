@@ -18,24 +18,21 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from unitcad.errors import Refusal, UnitcadError, WrongArgument
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
-from unitcad.rooms import stored_spec
 from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
-from unitcad.serve.request_guard import Limits, RequestGuard
+from unitcad.serve.request_guard import RequestGuard
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
 T = TypeVar("T", bound=msgspec.Struct)
 CAMPAIGN_S = 300.0
 """Seconds that the records of a campaign may take."""
-STORE_S = 10.0
-"""Seconds that a batch's store may take to give a variant's spec."""
 FILE_TYPES = {
     ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
     ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
@@ -61,13 +58,12 @@ class Setting:
     trusted: Trusted
     starts: Mapping[str, str | None]
     token: str
-    hosts: frozenset[str]
     port: int
     batch: Path | None = None
     campaign: tuple[Path, str] | None = None
 
 
-def application(live: Live, limits: Limits = Limits()) -> RequestGuard:  # noqa: B008  # frozen
+def application(live: Live) -> RequestGuard:
     """Return the ASGI application of a live page."""
     setting = live.setting
     routes = [
@@ -82,7 +78,7 @@ def application(live: Live, limits: Limits = Limits()) -> RequestGuard:  # noqa:
         Route("/cancel", live.cancel, methods=["POST"]),
     ]
     inner = Starlette(routes=routes, lifespan=live.lifespan)
-    return RequestGuard(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
+    return RequestGuard(inner, setting.token, setting.port, live.cookie, live.keys)
 
 
 class Live:
@@ -223,22 +219,16 @@ class Live:
         return given, ["--allow-code"] if given["code"] else []
 
     async def variant(self, request: Request) -> Response:
-        """Answer with the spec of a variant of the batch, as text: of its folder, else from the batch's store."""
-
+        """Answer with the spec of a variant of the batch, as text."""
         root, folder = self.setting.batch, request.path_params["folder"]
         path = _within(root, f"{folder}/spec.toml") if root else None
+        if path is None:
+            return PlainTextResponse("no such variant\n", 404)
         try:
-            if path is None and root is not None and (read_stored := stored_spec()):
-                text = await asyncio.wait_for(asyncio.to_thread(read_stored, root, folder), STORE_S)
-            elif path is None:
-                return PlainTextResponse("no such variant\n", 404)
-            else:
-                text = await asyncio.to_thread(read_text, path)
+            text = await asyncio.to_thread(read_text, path)
             return _json(msgspec.json.encode({"text": text}))
-        except WrongArgument as error:
-            return PlainTextResponse(f"no such variant: {error}\n", 404)
-        except (UnitcadError, OSError, TimeoutError) as error:
-            return _json(msgspec.json.encode({"faults": [Fault(str(error) or "the store does not answer")]}), 422)
+        except (UnitcadError, OSError) as error:
+            return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
 
     async def job(self, request: Request) -> Response:
         """Answer with how far a job is."""

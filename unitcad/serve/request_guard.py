@@ -1,4 +1,4 @@
-"""The guard of requests: checks Host, Origin and token, and limits requests in size, time and number.
+"""The guard of requests: checks Host, Origin and token.
 
 A page of another site can reach the loopback address through the person's browser. Its requests carry its own Origin,
 or under DNS rebinding its own Host, and never the token. A result's page is apart from the server too, and its links to
@@ -7,16 +7,13 @@ files next to it are another site's: they carry their folder's key in their path
 
 from __future__ import annotations
 
-import asyncio
 import hmac
-from dataclasses import dataclass
 from urllib.parse import parse_qs
 
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from unitcad.serve.access_keys import AccessKeys
-from unitcad.serve.addresses import means
 
 TOKEN_HEADER = b"x-unitcad-token"
 FILES = "/files/"
@@ -24,10 +21,6 @@ LARGEST_BODY = 4 << 20
 """Bytes of a request's body."""
 LONGEST_TARGET = 4000
 """Bytes of a request's path and query: each of a path's folders costs a check of its key."""
-BODY_S = 10.0
-"""Seconds that a request's body may take."""
-MOST_REQUESTS = 32
-"""Requests that are answered at the same time; more are sent away."""
 ALWAYS = (
     (b"cache-control", b"no-store"),
     (b"cross-origin-opener-policy", b"same-origin"),
@@ -38,29 +31,17 @@ ALWAYS = (
 )
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Bounds of a request: bytes of its body, seconds until it is there, requests at the same time."""
-
-    body: int = LARGEST_BODY
-    seconds: float = BODY_S
-    requests: int = MOST_REQUESTS
-
-
 class RequestGuard:
-    """ASGI middleware in front of `app`: passes a request on, its body whole, or refuses it with one line.
+    """ASGI middleware in front of `app`: passes a request on, or refuses it with one line.
 
-    `hosts` are the values of Host that mean this server (`addresses.hosts`). A request carries the token in a header,
-    which a page of another site can't set, or, if it only reads, in its query. Two of `keys` replace it: the
-    page itself is read with the cookie of the name `cookie`, and a file with its folder's key in its path.
+    Host is the loopback at `port`. A request carries the token in a header, which a page of another site can't set, or,
+    if it only reads, in its query. Two of `keys` replace it: the page itself is read with the cookie of the name
+    `cookie`, and a file with its folder's key in its path.
     """
 
-    def __init__(
-        self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, keys: AccessKeys, limits: Limits
-    ) -> None:
-        self.app, self.token, self.hosts, self.limits = app, token.encode(), hosts, limits
-        self.cookie, self.keys = cookie.encode(), keys
-        self._under_way = 0
+    def __init__(self, app: ASGIApp, token: str, port: int, cookie: str, keys: AccessKeys) -> None:
+        self.app, self.token, self.cookie, self.keys = app, token.encode(), cookie.encode(), keys
+        self.hosts = [f"{name}:{port}" for name in ("127.0.0.1", "localhost")]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -68,27 +49,18 @@ class RequestGuard:
             return
         if scope["type"] != "http":  # no web sockets here
             return
-        refused = self._refused(scope)
-        if refused is None and self._under_way >= self.limits.requests:
-            refused = 503, "too many requests at the same time"
-        if refused:
-            await self._answer(*refused, scope, receive, send)
-            return
-        self._under_way += 1
-        try:
-            body = await self._body(receive)
-            if isinstance(body, tuple):
-                await self._answer(*body, scope, receive, send)
-            else:
-                await self._answered(body, scope, receive, _with_headers(send))
-        finally:
-            self._under_way -= 1
+        answering = self.app
+        if refused := self._refused(scope):
+            status, reason = refused
+            # The rest of the body is not waited for.
+            answering = PlainTextResponse(f"{reason}\n", status, headers={"connection": "close"})
+        await answering(scope, receive, _with_headers(send))
 
     def _refused(self, scope: Scope) -> tuple[int, str] | None:
         """Return the status and the reason for which a request is refused by its head; None if it is not."""
         headers = [(name.lower(), value) for name, value in scope["headers"]]
         hosts = [value.decode("latin-1").lower() for name, value in headers if name == b"host"]
-        if len(hosts) != 1 or not means(hosts[0], self.hosts):
+        if len(hosts) != 1 or hosts[0] not in self.hosts:
             return 421, "this server answers only to its own address"
         origins = [value.decode("latin-1").lower() for name, value in headers if name == b"origin"]
         if any(origin != f"http://{hosts[0]}" for origin in origins):
@@ -105,8 +77,10 @@ class RequestGuard:
         if not keyed and not self._has_token(scope, headers):
             return 403, "no valid token: open the address that unitcad serve printed"
         lengths = [value for name, value in headers if name == b"content-length"]
-        if any(not value.isdigit() or int(value) > self.limits.body for value in lengths):
-            return 413, f"a body has at most {self.limits.body} bytes"
+        if any(not value.isdigit() or int(value) > LARGEST_BODY for value in lengths):
+            return 413, f"a body has at most {LARGEST_BODY} bytes"
+        if any(name == b"transfer-encoding" for name, _ in headers):
+            return 411, "a body states its length"
         return None
 
     def _has_folder_key(self, scope: Scope) -> bool:
@@ -132,65 +106,11 @@ class RequestGuard:
             key == self.cookie and hmac.compare_digest(text, self.keys.cookie.encode()) for key, _, text in parts
         )
 
-    async def _answered(self, body: bytes, scope: Scope, receive: Receive, send: Send) -> None:
-        """Have the app answer, as long as somebody waits for it."""
-        gone = asyncio.create_task(_gone(receive))
-        answering = asyncio.ensure_future(self.app(scope, _at_once(body, gone), send))
-        try:
-            await asyncio.wait([answering, gone], return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in (answering, gone):
-                task.cancel()
-            await asyncio.wait([answering, gone])
-        if not answering.cancelled():
-            answering.result()
-
-    async def _body(self, receive: Receive) -> bytes | tuple[int, str]:
-        """Return a request's body, or the status and the reason for which it is refused."""
-        parts, size = [], 0
-        try:
-            async with asyncio.timeout(self.limits.seconds):
-                while True:
-                    message = await receive()
-                    if message["type"] == "http.disconnect":
-                        return 400, "the request was broken off"
-                    part = message.get("body", b"")
-                    size += len(part)
-                    if size > self.limits.body:
-                        return 413, f"a body has at most {self.limits.body} bytes"
-                    parts.append(part)
-                    if not message.get("more_body"):
-                        return b"".join(parts)
-        except TimeoutError:
-            return 408, f"the body took more than {self.limits.seconds:g} s"
-
-    async def _answer(self, status: int, reason: str, scope: Scope, receive: Receive, send: Send) -> None:
-        # The rest of the body is not waited for.
-        response = PlainTextResponse(reason + "\n", status, headers={"connection": "close"})
-        await response(scope, receive, _with_headers(send))
-
 
 def _is_opened(headers: list[tuple[bytes, bytes]]) -> bool:
     """Tell whether a browser opens a page or a download with a request: no script or picture of a page asks for it."""
     said = {name: value for name, value in headers if name.startswith(b"sec-fetch-")}
     return (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
-
-
-async def _gone(receive: Receive) -> Message:
-    """Wait until the asker has left or has the whole answer."""
-    while (message := await receive())["type"] != "http.disconnect":
-        pass
-    return message
-
-
-def _at_once(body: bytes, gone: asyncio.Task[Message]) -> Receive:
-    """Return a `receive` that gives a body that is there already, then that the asker is gone."""
-    left: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
-
-    async def whole() -> Message:
-        return left.pop() if left else await asyncio.shield(gone)
-
-    return whole
 
 
 def _with_headers(send: Send) -> Send:

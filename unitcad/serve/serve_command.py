@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import webbrowser
 from pathlib import Path
@@ -12,7 +11,6 @@ import typer
 
 from unitcad.cli.shared_options import AllowCode
 from unitcad.errors import missing_extra
-from unitcad.serve.addresses import TOKEN
 from unitcad.validation import default_template
 
 
@@ -30,16 +28,12 @@ def serve(
     port: Annotated[
         int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0 takes a free one.")
     ] = 0,
-    host: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Address to bind to; other than the loopback needs UNITCAD_TOKEN.")
-    ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     code: AllowCode = False,
 ) -> None:
     """Open a live page of a spec in the browser.
 
     A change of a number shows unit, moulds, refusals and estimate at once. Ctrl-C ends it.
-    The environment variable UNITCAD_TOKEN is the token in the address. Default: a random one.
     """
 
     def ready(address: str) -> None:
@@ -52,5 +46,4 @@ def serve(
         from unitcad.serve.server import serve as run
     except ImportError as error:
         raise missing_extra("serve", f"the live page needs {error.name}") from None
-    token = os.environ.pop(TOKEN, None)  # not for the programs that it starts
-    run(source, host=host, port=port, token=token, out=out, code=code, ready=ready)
+    run(source, port=port, out=out, code=code, ready=ready)

@@ -1,4 +1,4 @@
-"""Starting the live page: the address, the token, the spec that it begins with."""
+"""Starting the live page: the token, the spec that it begins with."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ import asyncio
 import contextlib
 import secrets
 import socket
-import time
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import h11
 import uvicorn
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
@@ -21,7 +18,6 @@ from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import FileKind, expect_none_but, file_kinds
-from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown_host
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, Setting, application
 from unitcad.serve.jobs import RESULTS
@@ -32,100 +28,27 @@ from unitcad.text import some
 from unitcad.validation import compound_kind, custom_templates, default_template, every_template
 from unitcad.validation.load import is_path, named_file
 
-HEADERS_S = 10.0
-"""Seconds that a request's headers may take, or a new connection may be silent."""
-WRITE_S = 30.0
-"""Seconds for which a client may take nothing of an answer."""
-MOST_WAITING = 200
-"""Connections that wait for headers; a further one closes the one that waits longest."""
-
-
-class Connection(H11Protocol):
-    """An HTTP/1.1 connection, closed if headers are not whole after `headers_s` or nothing is taken for `write_s`."""
-
-    headers_s = HEADERS_S
-    write_s = WRITE_S
-    most_waiting = MOST_WAITING
-    since = 0.0
-    _late: asyncio.TimerHandle | None = None
-    _unread: asyncio.TimerHandle | None = None
-
-    def connection_made(self, transport: Any) -> None:
-        """Begin to wait for headers."""
-        super().connection_made(transport)
-        self._wait()
-        waiting = [one for one in self.connections if isinstance(one, Connection) and one._late]
-        if len(waiting) > self.most_waiting:
-            min(waiting, key=lambda one: one.since).transport.abort()
-
-    def data_received(self, data: bytes) -> None:
-        """Take bytes in, and wait for more until the headers are whole."""
-        super().data_received(data)
-        if self.conn.their_state is not h11.IDLE:
-            self._done()
-        elif self._late is None:
-            self._wait()
-
-    def pause_writing(self) -> None:
-        """Begin to wait until the client takes something."""
-        super().pause_writing()
-        self._unread = self.loop.call_later(self.write_s, self.transport.abort)
-
-    def resume_writing(self) -> None:
-        """Write on."""
-        self._taken()
-        super().resume_writing()
-
-    def timeout_keep_alive_handler(self) -> None:
-        """Close a connection without a further request; the rest of its last answer has its time too."""
-        super().timeout_keep_alive_handler()
-        self._taken()
-        self._unread = self.loop.call_later(self.write_s, self.transport.abort)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """Wait for nothing any more."""
-        self._done()
-        self._taken()
-        super().connection_lost(exc)
-
-    def _wait(self) -> None:
-        self.since = time.monotonic()
-        self._late = self.loop.call_later(self.headers_s, self.transport.abort)
-
-    def _taken(self) -> None:
-        if self._unread:
-            self._unread.cancel()
-            self._unread = None
-
-    def _done(self) -> None:
-        if self._late:
-            self._late.cancel()
-            self._late = None
-
-
+LOOPBACK = "127.0.0.1"
+MOST_REQUESTS = 200
+"""Connections and requests at the same time; more are sent away."""
 DEFAULT_OUT = Path("out")
 
 
 def serve(
     source: str | None,
     *,
-    host: str = LOOPBACK,
     port: int = 0,
-    token: str | None = None,
     out: Path = DEFAULT_OUT,
     code: bool = False,
     ready: Callable[[str], None] = lambda address: None,
 ) -> None:
-    """Serve the live page of a spec until it is interrupted; `ready` takes its address, with the token.
+    """Serve the live page of a spec on the loopback until it is interrupted; `ready` takes its address with the token.
 
     `source` is a file of a spec, an array or a campaign, a template's name, a result's folder, or a batch's, whose rows
     open live; None: the default template. `port` 0: any that is free.
-    Raises WrongArgument for an address beyond the loopback without a `token`, Refusal for a
-    spec whose design is code unless `code`, and UnitcadError for a port that is taken.
+    Raises Refusal for a spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
-
-    check_address(host, token)
-    token = token or secrets.token_urlsafe(24)
+    token = secrets.token_urlsafe(24)
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
         out = batch.resolve().with_name(f"{batch.resolve().name}-live")
@@ -149,19 +72,18 @@ def serve(
             starts[name] = read_text(each)
         except Refusal:
             starts[name] = None
-    with _listen(host, port) as listening:
+    with _listen(port) as listening:
         bound = listening.getsockname()[1]
         setting = Setting(
             text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
-            Trusted([source for source in trusted if source.named]), starts, token, hosts(host, bound), bound,
-            batch, campaign,
+            Trusted([source for source in trusted if source.named]), starts, token, bound, batch, campaign,
         )  # fmt: skip
-        address = f"http://{shown_host(host)}:{bound}/?token={token}"
+        address = f"http://{LOOPBACK}:{bound}/?token={token}"
         live = Live(setting)
         config = uvicorn.Config(
             application(live), log_level="error", access_log=False, server_header=False, date_header=False,
-            timeout_keep_alive=5, timeout_graceful_shutdown=2, h11_max_incomplete_event_size=16384, http=Connection,
-            ws="none", lifespan="on",
+            timeout_keep_alive=5, timeout_graceful_shutdown=2, limit_concurrency=MOST_REQUESTS, http="h11",
+            h11_max_incomplete_event_size=16384, ws="none", lifespan="on",
         )  # fmt: skip
         server = uvicorn.Server(config)
         # Ctrl-C is how a server is ended.
@@ -224,16 +146,15 @@ def is_own(source: str | None) -> bool:
     return source is not None and is_path(source) and source not in custom_templates()
 
 
-def _listen(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
+def _listen(port: int) -> socket.socket:
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listening.bind((host, port))
+        listening.bind((LOOPBACK, port))
         listening.listen(100)
     except OSError as error:
         listening.close()
-        raise UnitcadError(f"{host}:{port}: {error.strerror}; choose another with --port, or 0 for any") from None
+        raise UnitcadError(f"{LOOPBACK}:{port}: {error.strerror}; choose another with --port, or 0 for any") from None
     return listening
 
 

@@ -5,8 +5,7 @@
 
 from unitcad.sweeps.batch_call import BatchResult, batch
 from unitcad.sweeps.journal import Summary
-from unitcad.sweeps.result_folders import BatchOptions
-from unitcad.sweeps.run import run
+from unitcad.sweeps.run import BatchOptions, run
 from unitcad.sweeps.sweep import Sweep, load_sweep
 
 __all__ = ["BatchOptions", "BatchResult", "Summary", "Sweep", "batch", "load_sweep", "run"]

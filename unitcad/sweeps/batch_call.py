@@ -21,9 +21,8 @@ from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Preview, RefusedVariant, Summary
-from unitcad.sweeps.result_folders import BatchOptions
 from unitcad.sweeps.results import TABLES
-from unitcad.sweeps.run import Watch, count_variants, run, trim
+from unitcad.sweeps.run import BatchOptions, Watch, count_variants, run, trim
 from unitcad.sweeps.sweep import Sweep, load_sweep
 from unitcad.validation import Changes
 from unitcad.validation.plain_data import changes_of
@@ -109,8 +108,6 @@ def make(
 
     Raises Refusal or UnitcadError if nothing can be run.
     """
-    if options.folders and options.only == ("estimate",) and not sweep.of_compounds:
-        raise WrongArgument("folders", True, "estimates only are one table: leave it out")
     if options.only == ("estimate",) and not sweep.of_compounds:
         return write_estimates(sweep, folder, options, watch)
     with workers.executor(options.timeout) as (executor, number):
@@ -134,8 +131,6 @@ def batch(
     keep_going: bool = False,
     cache: str | os.PathLike[str] | None = None,
     report: bool = False,
-    store: str | os.PathLike[str] | None = None,
-    folders: bool | None = None,
     tables: Sequence[str] | str | None = None,
 ) -> BatchResult:
     """Make every variant of a sweep, each distinct part once. The same call again resumes an interrupted one.
@@ -156,12 +151,10 @@ def batch(
         Time limit for a variant, s.
     keep_going : bool, default False
         Continue after a variant that fails.
-    cache, store : path or str, optional
-        Folder of the cache; folder or address (s3://bucket/path) for content.
+    cache : path, optional
+        Folder of the cache. Default: the user's.
     report : bool, default False
         Write report.html.
-    folders : bool, optional
-        Write a folder for each variant. Default: below 1,000 variants.
     tables : str or sequence of str, optional
         Any of csv, json, parquet. Default: csv and json; parquet from 10,000 variants.
 
@@ -189,28 +182,12 @@ def batch(
     wanted = chosen.overridden({**changes_of(set), **own})
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
-    stored = None if store is None else os.fspath(store)
-    chosen_outputs = tuple(texts("only", only))
-    options = BatchOptions(
-        chosen_outputs,
-        check,
-        keep_going,
-        timeout,
-        limit,
-        where,
-        store=stored,
-        folders=folders_for(report, folders, chosen_outputs),
-        tables=check_tables(None if tables is None else texts("tables", tables), report),
-    )
+    listed = check_tables(None if tables is None else texts("tables", tables), report)
+    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where, tables=listed)
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
         write_report(folder)
     return BatchResult(folder, summary)
-
-
-def folders_for(report: bool, asked: bool | None, only: Sequence[str] = OUTPUTS) -> bool | None:
-    """Return whether each variant has a folder: a page links to them, unless they are declined or have nothing in."""
-    return True if report and asked is None and tuple(only) != ("estimate",) else asked
 
 
 def check_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str, ...] | None:

@@ -13,7 +13,6 @@ import typer
 from msgspec import to_builtins
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from unitcad.cache import DiskStore, default_root
 from unitcad.cli.output import console, print_json, print_json_line, progress, stage_lines, warn
 from unitcad.cli.shared_options import (
     AllowCode,
@@ -34,11 +33,10 @@ from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.batch_call import check_tables, folders_for, make, preview
+from unitcad.sweeps.batch_call import check_tables, make, preview
 from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.journal import Preview, Summary
-from unitcad.sweeps.result_folders import BatchOptions, export_variants
-from unitcad.sweeps.run import Watch
+from unitcad.sweeps.run import BatchOptions, Watch
 from unitcad.sweeps.task import VariantOutcome
 
 
@@ -145,16 +143,6 @@ def batch(
     cache_limit: Annotated[
         float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="Maximum cache size after the batch.")
     ] = 4096,
-    store: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="Store for content: a folder, s3://bucket/path. Default: the batch's folder."
-        ),
-    ] = None,
-    folders: Annotated[
-        bool | None,
-        typer.Option("--folders/--no-folders", help="Write a folder for each variant. Default: below 1,000 variants."),
-    ] = None,
     table: Annotated[
         str | None,
         typer.Option(metavar="NAMES", help="Tables: csv,json,parquet. Default: csv,json below 10,000 variants."),
@@ -186,18 +174,16 @@ def batch(
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
-    usual = only is None and not (folders is False or table or store or scheduler)
+    usual = only is None and not (table or scheduler)
     page = usual and wanted.count <= PAGE_UP_TO if page is None else page
-    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
-        folders_for(page, folders, chosen), check_tables(tables, page))  # fmt: skip
+    listed = check_tables(tables, page)
+    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, listed)
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
         return
     if chosen == ("estimate",) and scheduler is not None:
         raise Refusal("--scheduler", scheduler, "estimates only are computed in this process: leave it out")
-    if chosen == ("estimate",) and store is not None:
-        raise Refusal("--store", store, "estimates only are one table and no files: leave it out")
     folder = out or Path("out") / wanted.slug
     workers = Workers(jobs, scheduler)
     try:
@@ -265,36 +251,3 @@ def _print_preview(size: Preview) -> None:
         warn(f"variant {refused.index} is refused: {refused.reason}")
     if size.refused_count > len(size.refused):
         typer.echo(f"and {about}{size.refused_count - len(size.refused)} more", err=True)
-
-
-def export(
-    hashes: Annotated[
-        list[str],
-        typer.Argument(metavar="HASH...", help="Hash at the end of a variant's folder, or its beginning."),
-    ],
-    batch: Annotated[Path, typer.Option("--batch", metavar="DIR", help="Folder of the batch.")] = Path(),
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", metavar="DIR", help="Parent of the folders. Default: the batch's folder."),
-    ] = None,
-    store: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Store of the content. Default: the batch's.")
-    ] = None,
-    where: Annotated[
-        Path | None, typer.Option("--cache", metavar="DIR", help="Folder of the cache. Default: the user's.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Make the folders of some variants of a batch, from its store. Each is a line printed."""
-
-    kept = DiskStore(where or default_root())
-    try:
-        made = []
-        for folder in export_variants(batch, hashes, out or batch, kept, store):
-            made.append(str(folder))
-            if not as_json:
-                typer.echo(made[-1])
-    finally:
-        kept.close()
-    if as_json:
-        print_json({"folders": made})

@@ -11,8 +11,7 @@ from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.journal import Journal, JournalEntry, Summary
-from unitcad.sweeps.result_folders import BatchOptions
-from unitcad.sweeps.run import Watch, batch_head, count_entry, count_variants, finish
+from unitcad.sweeps.run import BatchOptions, Watch, batch_head, count_entry, count_variants, finish
 from unitcad.sweeps.sweep import Sweep
 
 

@@ -9,7 +9,6 @@ another batch, and checks their variants again.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import zlib
@@ -40,20 +39,10 @@ class BatchHead(Struct, frozen=True, kw_only=True):
     versions: dict[str, str] = {}
 
 
-class RecordPlace(Struct, frozen=True):
-    """Place of a variant's record in a store: bytes `start` to `end` of a pack, and their own SHA-256."""
-
-    pack: str
-    start: int
-    end: int
-    sha256: str
-
-
 class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Result of one variant; `same_as` is the index of an earlier, equal variant, whose result it shares.
 
     `values` are those that were swept, `row` those that came out; `manifest` is the SHA-256 of its manifest.json.
-    `record` is if a store has its files.
     """
 
     index: int
@@ -64,7 +53,6 @@ class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     row: Values = {}
     manifest: str = ""
     same_as: int | None = None
-    record: RecordPlace | None = None
 
 
 class Failure(Struct, frozen=True):
@@ -134,7 +122,6 @@ class Journal:
         self._seed = zlib.crc32(_text(self.head))
         self._lines = array("q")
         self.damaged = 0
-        self._begun = [path for path in (out / JOURNAL, out / LOCK, out) if not os.path.lexists(path)]
         self._lock = _lock(out, head)
         try:
             self._file = self._open(out / JOURNAL)
@@ -167,13 +154,6 @@ class Journal:
         """Let go of the folder."""
         self._file.close()
         self._lock.release()
-
-    def abandon(self) -> None:
-        """Unlock the folder, and remove the files begun in it: nothing was made."""
-        self.close()
-        with contextlib.suppress(OSError):
-            for path in self._begun:
-                path.rmdir() if path == self.out else path.unlink(missing_ok=True)
 
     def __enter__(self) -> Journal:
         return self

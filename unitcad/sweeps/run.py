@@ -9,23 +9,22 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from unitcad import __version__
-from unitcad.cache import DiskStore, collect, default_root, digest
+from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.plan import check_outputs, kernel_versions
 from unitcad.pipeline.subjects import subject
-from unitcad.pipeline.write import clear_leftovers
+from unitcad.pipeline.write import clear_leftovers, whole
+from unitcad.spec.raw import OUTPUTS
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.destination import Destination, InStore
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary
-from unitcad.sweeps.result_folders import BatchOptions, destination_of, folders_wanted, make_folders
 from unitcad.sweeps.results import columns_of, write_results, write_timings
 from unitcad.sweeps.sweep import MOST, Sweep
 from unitcad.sweeps.task import Job, Task, VariantOutcome
@@ -40,9 +39,28 @@ FIRST, NEXT = 4, 48
 COLLECT_EVERY = 500
 """Geometries made between two checks of the cache's size."""
 
-
 Watch = Callable[[Summary, VariantOutcome | None], None]
 MOST_FAILURES = 20
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """Options of a run.
+
+    `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
+    of finished variants, not only their sizes. `tables` are names of results.TABLES, None chooses by the number of
+    variants.
+    """
+
+    only: Sequence[str] = OUTPUTS
+    check: bool = True
+    keep_going: bool = False
+    timeout: float | None = None
+    limit: int | None = None
+    cache: Path | None = None
+    cache_mb: float = DEFAULT_LIMIT_MB
+    verify: bool = False
+    tables: Sequence[str] | None = None
 
 
 def run(
@@ -58,20 +76,17 @@ def run(
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
     `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers may be on other
-    machines: results go by a store. Variants that an earlier run in `out` finished are not made again. Raises
-    UnitcadError if nothing can be run; the summary has the outcome of each variant.
+    machines, which share the disk of `out`; their cache is their own, unless the options name one. Variants that an
+    earlier run in `out` finished are not made again. Raises UnitcadError if nothing can be run; the summary has the
+    outcome of each variant.
     """
     head = batch_head(sweep, check_outputs(options.only), options)
     count = count_variants(sweep, options.limit)
     summary = Summary(count)
     cache = DiskStore(options.cache or default_root())
+    shared = None if remote and options.cache is None else cache.root.absolute()
     journal = Journal(out, head)
-    try:
-        destination = destination_of(out, options, summary.variants, cache, remote)
-    except BaseException:
-        journal.abandon()
-        raise
-    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, destination, summary)
+    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, shared, summary)
     if journal.damaged:
         summary.warnings.append(
             f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
@@ -80,10 +95,7 @@ def run(
     try:
         clear_leftovers(out)
         batch.all()
-        if batch.lost:
-            clear_leftovers(out)
-        if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
-            make_folders(out, journal.entries(), destination.store, cache)
+        clear_leftovers(out)  # of workers that ended in the middle of their task
         finish(sweep, journal, head, options, summary, start, workers)
         watch(summary, None)
     except OSError as error:
@@ -152,10 +164,10 @@ class _Batch:
 
     def __init__(
         self, sweep: Sweep, options: BatchOptions, executor: Executor, room: int,
-        watch: Watch, journal: Journal, destination: Destination, summary: Summary,
+        watch: Watch, journal: Journal, cache: Path | None, summary: Summary,
     ) -> None:  # fmt: skip
         self.sweep, self.options, self.executor, self.room = sweep, options, executor, room
-        self.watch, self.journal, self.destination, self.summary = watch, journal, destination, summary
+        self.watch, self.journal, self.cache, self.summary = watch, journal, cache, summary
         self.only = check_outputs(options.only)
         self.coming = self._to_make()
         self.groups: dict[str, _GeometryJobs] = {}
@@ -165,7 +177,6 @@ class _Batch:
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
         self.running: dict[Future[list[VariantOutcome]], Task] = {}
-        self.lost = False  # whether a worker ended in the middle of its task
 
     def all(self) -> None:
         while not self.summary.stopped:
@@ -185,7 +196,7 @@ class _Batch:
         failed: list[int] = []
         for index in range(self.summary.variants):
             entry = self.journal.entry(index)
-            if entry is not None and self.destination.stands(entry):
+            if entry is not None and self._stands(entry):
                 self._finished(VariantOutcome(index, entry.status), fresh=False)
             elif entry is not None and entry.status == tasks.FAILED:
                 failed.append(index)
@@ -193,6 +204,13 @@ class _Batch:
                 yield index, entry
         for index in failed:
             yield index, self.journal.entry(index)
+
+    def _stands(self, entry: JournalEntry) -> bool:
+        """Check whether the folder of a variant that was made is still there and whole."""
+        folder, verify = self.journal.out / entry.folder, self.options.verify
+        if entry.status not in (tasks.OK, tasks.BROKEN) or whole(folder, hashes=verify) is None:
+            return False
+        return not verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 
     def _fill(self) -> bool:
         """Bring up to STEP variants into the window; return whether more may follow.
@@ -218,7 +236,7 @@ class _Batch:
                 continue
             key = wanted.key(self.only, self.options.check)
             self.groups.setdefault(key, _GeometryJobs()).jobs.append(
-                Job(index, wanted.text, self.destination.damaged(entry) if entry else "")
+                Job(index, wanted.text, entry.manifest if entry else "")
             )
             self.waiting += 1
         return self.waiting < WINDOW
@@ -230,8 +248,9 @@ class _Batch:
             if chosen is None:
                 return
             key, jobs = chosen
-            task = Task(tuple(jobs), key, self.only, self.options.check, self.options.timeout)
-            self.running[self.executor.submit(tasks.work, self.destination.task(task))] = task
+            out, options = self.journal.out.absolute(), self.options
+            task = Task(tuple(jobs), key, self.only, options.check, options.timeout, out, self.cache)
+            self.running[self.executor.submit(tasks.work, task)] = task
 
     def _next(self) -> tuple[str, list[Job]] | None:
         """Choose the next task: a variant to repeat, a geometry to make, or more variants of a made one."""
@@ -282,7 +301,6 @@ class _Batch:
         """Handle a task whose worker ended: each of its variants is tried by itself, to find the one that ended it."""
         if isinstance(error, CancelledError):
             raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the same command resumes")
-        self.lost = True
         job, *others = task.jobs
         if others:
             self.again.extend((task.geometry, job) for job in task.jobs)
@@ -302,7 +320,12 @@ class _Batch:
             self.again.append((key, job))
             return
         self.tried.discard(outcome.index)
-        self._finished(self.destination.take(outcome))
+        if outcome.folder and not (self.journal.out / outcome.folder).is_dir():
+            raise UnitcadError(
+                f"{self.journal.out}: the workers' results are not in this folder: they have a disk of their own; "
+                "choose a folder on a disk that they and this machine share with -o"
+            )
+        self._finished(outcome)
 
     def _finished(self, outcome: VariantOutcome, fresh: bool = True, before: bool = True) -> None:
         """Count a variant that has ended, and note it if it is `fresh`; others are from `before`, or another's twin."""
@@ -317,7 +340,6 @@ class _Batch:
                     values=self.sweep.values(outcome.index)[1],
                     row=outcome.row,
                     manifest=outcome.manifest,
-                    record=outcome.record,
                 )
             )
         summary.resumed += before and not fresh

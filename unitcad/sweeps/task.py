@@ -6,23 +6,20 @@ import contextlib
 import errno
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 
 from unitcad import files
-from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
+from unitcad.cache import DiskStore, default_root, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import write as folders
-from unitcad.pipeline.make import Product, Progress, Subject
+from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes, row
 from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.subjects import subject_of_text
-from unitcad.pipeline.write import TRIES
 from unitcad.spec import custom_code
-from unitcad.sweeps import record_packs
-from unitcad.sweeps.journal import RecordPlace, Values
+from unitcad.sweeps.journal import Values
 from unitcad.workers import limit
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
@@ -43,10 +40,8 @@ class Job:
 
 @dataclass(frozen=True)
 class Task:
-    """Variants of one geometry, and how to make them.
+    """Variants of one geometry, made into folders in `out`; without `cache` by the cache of the worker's user.
 
-    With `store` (an address) results go there; work is then shared by `cache` if there is one, else by the store.
-    Without, they go to folders in `out`, with a `cache`.
     `allowed` is the code that the caller may run, and so may the worker.
     """
 
@@ -54,20 +49,16 @@ class Task:
     geometry: str
     only: tuple[str, ...]
     check: bool
-    timeout: float | None = None
-    out: Path = Path()
-    cache: Path | None = None
-    store: str | None = None
+    timeout: float | None
+    out: Path
+    cache: Path | None
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
 
 @dataclass(frozen=True)
 class VariantOutcome:
-    """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json.
-
-    `record` is the place of the files in a store. `product` and `bundle` do not leave the worker.
-    """
+    """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json."""
 
     index: int
     status: str
@@ -78,77 +69,31 @@ class VariantOutcome:
     built: int = 0
     reused: int = 0
     manifest: str = ""
-    record: RecordPlace | None = None
-    product: Product | None = None
-    bundle: Bundle | None = None
 
 
 def work(task: Task) -> list[VariantOutcome]:
-    """Make a task's variants. An error of one of them is in its outcome."""
+    """Make a task's variants; when they return, all is on the disk. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
-    if task.store:
-        return _into_store(task, record_packs.store_at(task.store))
-    return _into_folders(task)
-
-
-def _each(
-    jobs: Sequence[Job], task: Task, make: Callable[[Job, Bundle | None], VariantOutcome], known: Bundle | None = None
-) -> list[VariantOutcome]:
-    """Make each variant; an error is its outcome. `make` gets the known files of the geometry."""
-    done = []
-    for job in jobs:
-        start = time.perf_counter()
-        try:
-            with limit(task.timeout):
-                outcome = make(job, known)
-        except Exception as error:
-            outcome = failure(job.index, error)
-        done.append(replace(outcome, seconds=time.perf_counter() - start))
-        known = outcome.bundle or known
+    try:
+        with files.scratch(task.out) as scratch:
+            done = [_timed(job, task, scratch) for job in task.jobs]
+    except OSError as error:
+        return [failure(job.index, error) for job in task.jobs]
+    folders.sync(task.out / outcome.folder for outcome in done if outcome.folder)
     return done
 
 
-def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
-    """Make a task's variants, put new contents into the store, and return rows: when they return, all is there."""
-    anew = any(job.damaged for job in task.jobs)
+def _timed(job: Job, task: Task, scratch: Path) -> VariantOutcome:
+    """Make a variant within the task's time; an error is its outcome."""
+    start = time.perf_counter()
     try:
-        known = None if anew or task.cache else record_packs.known_bundle(store, task.geometry)
+        with limit(task.timeout):
+            outcome = _make(job, task, scratch)
     except Exception as error:
-        return [failure(job.index, error) for job in task.jobs]
-    done = _each(task.jobs, task, lambda job, known: _deliver(job, task, known, store, anew), known)
-    try:
-        places = record_packs.pack(store, [outcome.product for outcome in done if outcome.product])
-    except Exception as error:
-        return [failure(outcome.index, error) if outcome.product else outcome for outcome in done]
-    left = iter(places)
-    return [
-        replace(outcome, product=None, bundle=None, record=next(left)) if outcome.product else outcome
-        for outcome in done
-    ]
-
-
-def _deliver(job: Job, task: Task, known: Bundle | None, store: SharedStore, anew: bool) -> VariantOutcome:
-    """Make a variant in memory, and put the contents that it shares into the store; its own files are still here."""
-    spec = subject_of_text(job.spec)
-    maker = _store(task.cache) if task.cache else MemoryStore(known)
-    for left in reversed(range(TRIES)):
-        if not left:
-            maker = MemoryStore(known)  # others clear the cache all the time
-        before = Counter(maker.counts)
-        try:
-            product = spec.make(task.only, task.check, maker, Progress())
-            shared = sorted(set(product.shared.values()))
-            store.keep_all([maker.content(sha) for sha in shared if anew or not store.noted(sha)], anew=anew)
-            break
-        except MissingContent:  # the cache is cleared meanwhile
-            continue
-    outcome = _of_product(job, spec, product, maker.counts - before)
-    bundle = maker.bundle() if isinstance(maker, MemoryStore) and outcome.built else None
-    if bundle:
-        record_packs.offer_bundle(store, task.geometry, bundle, anew=anew)
-    return replace(outcome, product=product, bundle=bundle)
+        outcome = failure(job.index, error)
+    return replace(outcome, seconds=time.perf_counter() - start)
 
 
 def failure(index: int, error: BaseException) -> VariantOutcome:
@@ -161,26 +106,14 @@ def failure(index: int, error: BaseException) -> VariantOutcome:
     return VariantOutcome(index, FAILED, reason=" ".join(text.split()))
 
 
-def _into_folders(task: Task) -> list[VariantOutcome]:
-    """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk."""
-    try:
-        with files.scratch(task.out) as scratch:
-            done = _each(task.jobs, task, lambda job, known: _locally(job, task, scratch))
-    except OSError as error:
-        return [failure(job.index, error) for job in task.jobs]
-    folders.sync(task.out / outcome.folder for outcome in done if outcome.folder)
-    return done
-
-
-def _locally(job: Job, task: Task, scratch: Path) -> VariantOutcome:
+def _make(job: Job, task: Task, scratch: Path) -> VariantOutcome:
     """Make a variant into its folder in `task.out`."""
-    assert task.cache is not None
     spec = subject_of_text(job.spec)
     folder = task.out / spec.folder_name
     manifest = _finished_manifest(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
-    store = _store(task.cache)
+    store = _store(task.cache or default_root())
     before = Counter(store.counts)
     built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
     return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
@@ -201,12 +134,6 @@ def _outcome(
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],
     )
-
-
-def _of_product(job: Job, spec: Subject, product: Product, counts: Counter[str]) -> VariantOutcome:
-    """Return the outcome of a variant that was made in memory."""
-    sha256 = digest(product.own["manifest.json"])
-    return _outcome(job, spec, spec.folder_name, product.manifest, sha256, counts)
 
 
 def _manifest_sha256(folder: Path) -> str:

@@ -111,7 +111,7 @@ def every_fault(first: Refusal, data: Mapping[str, Any], judge: Judge, sound: Ma
         return [first]
     if any(one.field == first.field for one in every):
         return every
-    return [_suggest(first, data, judge, sound, not every), *every]
+    return [suggest_value(first, data, judge, sound, not every), *every]
 
 
 def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> list[Refusal]:
@@ -141,7 +141,7 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
     for refusal, _ in typed:
         others = {path: value for other, passed in typed if other is not refusal for path, value in passed.items()}
         rest = with_changes(data, others)
-        every.append(_suggest(refusal, rest, judge, sound, len(typed) == 1))
+        every.append(suggest_value(refusal, rest, judge, sound, len(typed) == 1))
     return every if len(every) < 2 else _accepted_together(every, typed, data, judge)
 
 
@@ -182,7 +182,9 @@ def _does(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> bool:
     return refusal.nearest is not None and find_refusal(data, {refusal.field: refusal.nearest}, judge) is None
 
 
-def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any], alone: bool) -> Refusal:
+def suggest_value(
+    refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any], alone: bool = True
+) -> Refusal:
     """Return the only fault of data with a suggestion: another value, another key, or several together.
 
     `alone`: the file had no other fault. Only then is the blame looked for in other keys, which takes many trials.

@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 
 from benchmarks.accuracy.ball_reference import response
-from benchmarks.accuracy.random_media import trial
+from unitcad.accuracy.random_media import trial
 
 MEDIA = (
     ("undamped", 609318770010),

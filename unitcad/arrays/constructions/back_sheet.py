@@ -5,21 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from unitcad.arrays.array import Array, Box
 from unitcad.arrays.circuit import Wiring, wiring
 from unitcad.arrays.constructions import Construction, Level
 from unitcad.arrays.piece_seams import (
+    SIDES,
+    Side,
     Strip,
+    along_side,
     box_feature,
-    intervals,
     longer_than_bed,
     of_sheet,
     on_pieces,
+    outer_sides,
+    pieces,
     round_units,
+    seams_of,
     sheet_mm2,
-    size_tool,
     too_much,
 )
 from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile, stopped_ring
@@ -32,7 +36,7 @@ from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
 from unitcad.moulds.cup import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
-from unitcad.moulds.cuts import BESIDE, Feature, Interval, Seam, Split, seams, split, strips, unseen
+from unitcad.moulds.cuts import BESIDE, Feature, Interval, Seam, Split, split, strips, unseen
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
 from unitcad.moulds.pieces import (
     CAST,
@@ -119,8 +123,6 @@ def _cut(drawn: Drawing) -> Drawing:
     bore = drawn.dims.outer_radius
     grooved = round_units(array, [bore + moulds.land_mm + moulds.groove_width_mm] * len(array.places))
     clear, close = [*grooved, *slots, *kept], [*round_units(array, [bore] * len(array.places)), *slots, *kept]
-    what = f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm"
-    play = moulds.plinth_clearance_mm
     dims, sheet = drawn.dims, array.sheet
     inner = [dims.cavity_radius, *dims.radii][-2]
     moats = len(array.places) * math.pi * (dims.radii[-1] ** 2 - inner**2) * sheet.low
@@ -131,14 +133,16 @@ def _cut(drawn: Drawing) -> Drawing:
         return pry_slots(drawn.spec, drawn.lay, found, drawn.pins.places, drawn.hole)
 
     under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
-    bases = size_tool(array, (-plate[0], -plate[1], *plate), clear, close, under)
-    try:
-        base = seams(bases, what, play, fault=lambda found: levers(found)[1])
-    except Refusal:
-        # The bed that would do must do for the cups too.
-        base = seams(bases, what, play, fault=lambda found: levers(found)[1] or fault(found))
-    what = f"a cup of {2 * x:.4g} x {2 * y:.4g} mm"
-    cups = seams(size_tool(array, (-x, -y, x, y), clear, close), what, play, base, fault)
+    base = seams_of(
+        array,
+        (-plate[0], -plate[1], *plate),
+        f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm",
+        clear,
+        close,
+        lambda found: levers(found)[1],
+        under=under,
+    )
+    cups = seams_of(array, (-x, -y, x, y), f"a cup of {2 * x:.4g} x {2 * y:.4g} mm", clear, close, fault, other=base)
     cut_at = replace(drawn, base_seams=base, cup_seams=cups, pry=levers(base)[0])
     return replace(cut_at, pins=replace(drawn.pins, places=(*drawn.pins.places, *_more_pins(cut_at))))
 
@@ -165,21 +169,18 @@ def _more_pins(drawn: Drawing) -> list[Point]:
     out_y = drawn.pins.places[-1][1]
     out = x - (y - out_y), out_y
     standing = list(drawn.pins.places)
-    for along in intervals((-y, y), cut_at, "y"):
-        for across in intervals((-x, x), cut_at, "x"):
-            piece = across, along
-            if sum(across[0] < at < across[1] and along[0] < up < along[1] for at, up in standing) >= 2:
-                continue
-            own: list[Side] = [
-                side for side, (axis, sign) in _SIDES.items() if piece[axis][0] < sign * out[axis] < piece[axis][1]
-            ]
-            new: list[Point] = []
-            for side in own:
-                axis, sign = _SIDES[side]
-                middles = [(place.x, place.y)[1 - axis] for place in drawn.array.places]
-                for at in _beside_slots(drawn, side, middles, piece[1 - axis], 2 if len(own) == 1 else 1):
-                    new.append((at, sign * out[axis]) if axis else (sign * out[axis], at))
-            standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
+    for piece in pieces((-x, -y, x, y), cut_at):
+        inside = piece[0], piece[2]
+        if sum(inside[0] < at < inside[1] and piece[1] < up < piece[3] for at, up in standing) >= 2:
+            continue
+        own = outer_sides(piece, (-x, -y, x, y))
+        new: list[Point] = []
+        for side in own:
+            axis, sign = SIDES[side]
+            middles = [(place.x, place.y)[1 - axis] for place in drawn.array.places]
+            for at in _beside_slots(drawn, side, middles, along_side(piece, side), 2 if len(own) == 1 else 1):
+                new.append((at, sign * out[axis]) if axis else (sign * out[axis], at))
+        standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
     return standing[len(drawn.pins.places) :]
 
 
@@ -233,7 +234,7 @@ def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") 
     sheets = [not label and pour == pours for pour in range(1, pours + 1)]
     blanks = [_base(drawing), *(_cup(drawing, layer, last=sheet) for layer, sheet in enumerate(sheets))]
     label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
-    base = base_piece(engrave(blanks[0], _base_letters(drawing, f"B{label}")))
+    base = base_piece(engrave(blanks[0], list(_base_letters(drawing, f"B{label}"))))
     base = replace(base, removal=DOWN) if any(sheets) else base
     filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
     cups: list[Body] = []
@@ -282,10 +283,10 @@ def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Spli
             yield split(tool, where)
 
 
-def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
+def _base_letters(drawing: Drawing, label: str) -> Iterator[Shape]:
     """Draw the base's label; on a base that is cut, on each piece with its number, or only the number."""
     spec, (x, y) = drawing.spec, drawing.lay.plate
-    strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "top")
+    strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "back")
     if all(slot.customary for slot in drawing.pry):
         return on_pieces(strip, [(label,)], drawing.base_seams)
     beside = strip._replace(taken=[slot.taken(drawing.lay) for slot in drawing.pry])
@@ -301,8 +302,8 @@ def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
     hole = drawing.hole
     taken = [(x - MARK, y - MARK, x, y)]
     taken += [(at - hole, beside - hole, at + hole, beside + hole) for at, beside in drawing.pins.places]
-    strip = Strip((-x, -y, x, y), TEXT_MARGIN, stroke, _engraving(spec, rim), "top", taken)
-    return on_pieces(strip, [(own, label), (own,)], drawing.cup_seams)
+    strip = Strip((-x, -y, x, y), TEXT_MARGIN, stroke, _engraving(spec, rim), "back", taken)
+    return list(on_pieces(strip, [(own, label), (own,)], drawing.cup_seams))
 
 
 def _engraving(spec: Spec, top: float) -> tuple[float, float]:
@@ -473,10 +474,6 @@ STEP = 0.5
 """Between two places that are tried for a slot, mm."""
 LEAST_DEPTH = 0.8
 """Of a slot over a filament's groove, mm: the tip of a thin screwdriver still gets in (assumed)."""
-Side = Literal["left", "right", "front", "back"]
-_SIDES: dict[Side, tuple[int, int]] = {"front": (1, -1), "back": (1, 1), "left": (0, -1), "right": (0, 1)}
-"""The axis that leads to each side, and its sign there."""
-_ENDS: tuple[Side, ...] = ("left", "right")
 
 
 class PrySlot(NamedTuple):
@@ -494,7 +491,7 @@ class PrySlot(NamedTuple):
 
     def taken(self, lay: Layout) -> Box:
         """Return its extent on the plate, from under the cup to beyond the edge, mm."""
-        axis, sign = _SIDES[self.side]
+        axis, sign = SIDES[self.side]
         low, high = sorted((sign * (lay.cup[axis] - PRY_UNDER), sign * (lay.plate[axis] + BEYOND)))
         ends = self.middle - PRY_HALF_WIDTH, self.middle + PRY_HALF_WIDTH
         return (ends[0], low, ends[1], high) if axis else (low, ends[0], high, ends[1])
@@ -503,26 +500,6 @@ class PrySlot(NamedTuple):
         """Draw it in a plate whose upper face is z = 0."""
         x0, y0, x1, y1 = self.taken(lay)
         return box(x0, x1, y0, y1, -self.depth, BEYOND / 4)
-
-
-class Piece(NamedTuple):
-    """A piece of the base: its number, and its extent between the teeth, along x and y (mm)."""
-
-    number: int
-    across: Interval
-    along: Interval
-
-    def sides(self, lay: Layout) -> list[Side]:
-        """Return the sides of the base that it has."""
-        extent = self.across, self.along
-        return [side for side, (axis, sign) in _SIDES.items() if sign * lay.plate[axis] in extent[axis]]
-
-
-def pieces(lay: Layout, seams: Sequence[Seam]) -> list[Piece]:
-    """Return the pieces of a base that is cut at seams, row by row from the top."""
-    x, y = lay.plate
-    rows, columns = intervals((-y, y), seams, "y")[::-1], intervals((-x, x), seams, "x")
-    return [Piece(n, column, row) for n, (row, column) in enumerate(((r, c) for r in rows for c in columns), 1)]
 
 
 def pry_slots(
@@ -534,29 +511,29 @@ def pry_slots(
     at its left and right edge, or at the front and the back. Existing `pins` have holes of the radius
     `hole` (mm).
     """
-    depth = plate_top(spec) - pry_floor(spec)
+    depth, plate = plate_top(spec) - pry_floor(spec), (-lay.plate[0], -lay.plate[1], *lay.plate)
     found: list[PrySlot] = []
-    for piece in pieces(lay, seams):
-        sides = piece.sides(lay)
-        middle = piece.along[0] < 0.0 < piece.along[1]
-        own = [PrySlot(piece.number, side, 0.0, depth) for side in _ENDS[::-1] if side in sides and middle]
-        for pair in (_ENDS, ("front", "back")):
-            own = own or [slot for side in pair if side in sides for slot in _at(spec, lay, piece, side, pins, hole)]
+    for i, piece in enumerate(pieces(plate, seams), 1):
+        sides = outer_sides(piece, plate)
+        middle = piece[1] < 0.0 < piece[3]
+        own = [PrySlot(i, side, 0.0, depth) for side in ("right", "left") if side in sides and middle]
+        for pair in (("left", "right"), ("front", "back")):
+            at = (slot for side in pair if side in sides for slot in _at(spec, lay, piece, side, pins, hole))
+            own = own or [PrySlot(i, *slot) for slot in at]
         if not own:
-            lack = "has no room at its edges" if sides else "has no edge of the base"
-            why = f"piece {piece.number} of the base {lack} for a pry slot, and nothing would lever it off"
+            why = f"piece {i} of the base has no room at its edges for a pry slot, and nothing would lever it off"
             return tuple(found), why
         found += own
     return tuple(found), ""
 
 
 def _at(
-    spec: Spec, lay: Layout, piece: Piece, side: Side, pins: Sequence[tuple[float, float]], hole: float
-) -> Iterator[PrySlot]:
-    """Yield the slot at a piece's side, the nearest to its middle that leaves room for a pin next to it; or none."""
-    to_side, sign = _SIDES[side]
+    spec: Spec, lay: Layout, piece: Box, side: Side, pins: Sequence[Point], hole: float
+) -> Iterator[tuple[Side, float, float]]:
+    """Yield side, middle and depth of a piece's slot, as near to its middle as leaves room for a pin; or nothing."""
+    to_side, sign = SIDES[side]
     axis = 1 - to_side
-    ends, edge = (piece.across, piece.along)[axis], lay.plate[axis]
+    ends, edge = along_side(piece, side), lay.plate[axis]
     low, high = (end + sign * (BESIDE if abs(end) < edge else MARK) for end, sign in zip(ends, (1, -1), strict=True))
     near = PRY_HALF_WIDTH + hole + spec.moulds.least_wall_mm
     standing = [pin[axis] for pin in pins if sign * pin[to_side] > 0]
@@ -566,7 +543,7 @@ def _at(
         beside = (ends[0] + 2 * PIN_RADIUS < middle - near, middle + near < ends[1] - 2 * PIN_RADIUS)
         depth = _depth(spec, lay, side, middle)
         if any(beside) and depth and all(abs(middle - pin) >= near for pin in standing):
-            yield PrySlot(piece.number, side, middle, depth)
+            yield side, middle, depth
             return
 
 

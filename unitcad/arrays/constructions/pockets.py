@@ -12,8 +12,8 @@ from unitcad.arrays.piece_seams import (
     of_sheet,
     on_pieces,
     round_units,
+    seams_of,
     sheet_mm2,
-    size_tool,
     too_much,
 )
 from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile
@@ -22,7 +22,7 @@ from unitcad.designs.design import Cell, Layout
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise, segment_count, thick_pieces
 from unitcad.moulds.cavities import united
-from unitcad.moulds.cuts import Seam, seams, split
+from unitcad.moulds.cuts import Seam, split
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.pieces import CAST, Removal, bar, base_piece, blade_piece, engrave, set_label
 from unitcad.moulds.plan import Plan, Step
@@ -50,7 +50,7 @@ def plan(array: Array) -> Plan:
     depth = min(spec.moulds.engraving_depth_mm, groove_depth_of(spec, sheet.thickness_mm))
     wall = (outer[3] - sheet.outline[3] - spec.moulds.land_mm - spec.moulds.groove_width_mm - HEIGHT * stroke) / 2
     heights = sheet.thickness_mm - depth, sheet.thickness_mm + BEYOND
-    letters = on_pieces(Strip(outer, wall, stroke, heights, "bottom"), [(f"B{label}",)], cut_at)
+    letters = list(on_pieces(Strip(outer, wall, stroke, heights, "front"), [(f"B{label}",)], cut_at))
     half = (outer[2] - outer[0]) / 2, (outer[3] - outer[1]) / 2
     strike = blade_piece(bar(half[1], sheet.thickness_mm), too_long=longer_than_bed(spec, 2 * half[1]))
     tools = base_piece(engrave(drawn, letters)), strike
@@ -126,7 +126,7 @@ def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
     plate, thickness = array.unit.moulds.plate_mm, array.sheet.thickness_mm
     area = sheet_mm2(array) - sum(math.pi * (place.radius - array.sheet.hold_mm) ** 2 for place in array.places)
     fault = too_much(array, outer, (plate, plate + thickness), area * thickness)
-    return seams(size_tool(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm, fault=fault)
+    return seams_of(array, outer, what, kept, kept, fault)
 
 
 LEAST_WEB = 2.0

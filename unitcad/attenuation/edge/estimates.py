@@ -13,9 +13,8 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 
-from unitcad.attenuation.curve import decay_at, layered_block
+from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.level import edge_level, model_block, range_notes, unknown
 from unitcad.attenuation.edge.measured import (
     CLASSES,
@@ -368,7 +367,6 @@ CLASSES_NOTE = (
 )
 SAME_P = 0.05
 """Largest sign-flip p at which the difference of two models is significant."""
-DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
 
 
 Layered = Callable[[EstimateInput], dict[str, Any]]
@@ -436,35 +434,6 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
         },
         "at_bound": {name: one.at_bound for name, one in scores.items() if one.at_bound},
     }
-
-
-def frequency_table(
-    variant: EstimateInput,
-    frequencies: Sequence[float],
-    models: Sequence[str] = MODELS,
-    fit: LabFit | None = None,
-) -> dict[str, Any]:
-    """Return {variant, frequencies}: per frequency (Hz) each model's edge level and the decay at `DECAY_AT_MM`.
-
-    `flat_over_edge`, `axial_over_edge`: of |u| under either drive; `u_over_edge`: under the motor's;
-    `u_z_over_edge`: of |u_z| under an axial one.
-    """
-    rows, places = [], [f"at_{d:g}_mm" for d in DECAY_AT_MM]
-    models = sorted(models, key=in_order(assessments(variant.moduli)).index)
-    for hertz in frequencies:
-        at = replace(variant, frequency=Quantity(hertz))
-        decays = decay_at(at, hertz, DECAY_AT_MM)
-        rows.append(
-            {
-                "frequency_hz": hertz,
-                "edge_level": {model: model_block(at, model, fit)["edge_level"] for model in models},
-                **{f"{name}_over_edge": dict(zip(places, decay, strict=True)) for name, decay in decays.items()},
-            }
-        )
-    block = variant_block(variant)
-    value = frequencies[0] if len(frequencies) == 1 else None
-    block["frequency_hz"] = {"value": value, "low": min(frequencies), "high": max(frequencies)}
-    return rounded({"variant": block, "frequencies": rows, "assumptions": ASSUMPTIONS})
 
 
 def variant_block(variant: EstimateInput) -> dict[str, Any]:

@@ -194,7 +194,7 @@ _WORTH = 0.2
 """Share of the error that another attempt must be able to gain.
 
 A tighter rtol that is not reached then is at most 1.25 times worse than a looser one, but for rare media: one of 2,000
-random ones was 2.5 times worse (`benchmarks.accuracy.random_media.trial("extreme contrast", 90143)`).
+random ones was 2.5 times worse (`random_media.trial("extreme contrast", 90143)`).
 """
 
 

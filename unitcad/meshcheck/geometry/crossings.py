@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, distinct, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, sorted_with_order
 from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, meeting_pairs, slabs_of
 from unitcad.meshcheck.geometry import predicates
 from unitcad.meshcheck.geometry.mesh import area_vectors, float32_steps, same_place
@@ -158,15 +158,11 @@ class Crossings:
 
     def touching(self) -> Ints:
         """Return pairs of shells (k, 2) whose faces meet, the smaller number first."""
-        keys = self.contact.pairs()[0]
-        return self.contact.shells_of(keys[distinct(keys)])
+        return np.stack(np.divmod(self.contact.pairs()[0], self.contact.shells), axis=1)
 
 
-def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
-    """Find the pairs of faces that meet, each where the file has it.
-
-    `every`: all pairs of those that touch, else one for each pair of shells.
-    """
+def crossings_of(topology: Topology, tick: Tick) -> Crossings:
+    """Find the pairs of faces that meet, each where the file has it; of those that touch one for a pair of shells."""
     vertices, stored = topology.mesh.vertices, topology.stored
     frame = frame_of(vertices)
     steps = frame.steps(vertices)
@@ -177,7 +173,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
         return Crossings()
     tick()
     faces = _prepared(topology, order)
-    crossings = Crossings(faces, Contacts(topology.n_shells, every, max(MOST_CONTACTS, 2 * len(order))))
+    crossings = Crossings(faces, Contacts(topology.n_shells, max(MOST_CONTACTS, 2 * len(order))))
     slabs, waiting = slabs_of(steps, *faces.corners), list[tuple[Ints, Ints]]()
     try:
         for i, j in meeting_pairs(boxes.take(order, axis=0), tick):

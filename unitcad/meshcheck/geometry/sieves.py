@@ -14,13 +14,12 @@ MOST_CONTACTS = 1_000_000
 
 @dataclass(eq=False)
 class Contacts:
-    """Pairs of shells that meet, each with the first pair of faces found, or with `every` one.
+    """Pairs of shells that meet, each with the first pair of faces found.
 
     With more than `most` pairs of faces it is `full`, and takes no more.
     """
 
     shells: int
-    every: bool = False
     most: int = MOST_CONTACTS
     full: bool = False
     noted: list[tuple[Ints, Ints]] = field(default_factory=list)
@@ -44,10 +43,9 @@ class Contacts:
     def unknown(self, shell: Ints, i: Ints, j: Ints) -> Ints:
         """Return the places of pairs of faces i, j whose shells differ and are not known to meet."""
         one, other = shell.take(i), shell.take(j)
-        open_ = (one != other) & (not self.full)
-        if not self.every:
-            open_ &= ~among(self.keys(one, other), self.pairs()[0])
-        return np.flatnonzero(open_)
+        if self.full:
+            return np.empty(0, np.int64)
+        return np.flatnonzero((one != other) & ~among(self.keys(one, other), self.pairs()[0]))
 
     def pairs(self) -> tuple[Ints, Ints]:
         """Return the keys of shells that meet and pairs of their faces (k, 2), in the order of the keys."""
@@ -55,15 +53,9 @@ class Contacts:
             return np.empty(0, np.int64), np.empty((0, 2), np.int32)
         keys, pairs = (np.concatenate(part) for part in zip(*self.noted, strict=True))
         ordered, order = sorted_with_order(keys.astype(np.uint64), max(self.shells**2 - 1, 1).bit_length())
-        if not self.every:
-            fresh = distinct(ordered)
-            ordered, order = ordered[fresh], order[fresh]
-        self.noted = [(ordered.astype(np.int64), pairs[order])]
+        fresh = distinct(ordered)
+        self.noted = [(ordered[fresh].astype(np.int64), pairs[order[fresh]])]
         return self.noted[0]
-
-    def shells_of(self, keys: Ints) -> Ints:
-        """Return the pairs of shells (k, 2) of these keys, the smaller number first."""
-        return np.stack(np.divmod(keys, self.shells), axis=1)
 
 
 _UNIT = np.finfo(np.float64).eps / 2

@@ -12,9 +12,8 @@ from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import threemf_package as opc
-from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.threemf_model import read_model
-from unitcad.meshcheck.readers.threemf_package import Package, Relation, image_kind
+from unitcad.meshcheck.readers.threemf_package import Package, Relation
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.f_file import F003, F011, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P009, P011, P012, P014, P017, P019, P020
@@ -24,9 +23,7 @@ from unitcad.text import some
 
 _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
-_TEXTURED = ("speculartextureid", "glossinesstextureid", "metallictextureid", "roughnesstextureid")
 SOLID = ("model", "solidsupport")
-_STACK = f"{schema.SLICE} slicestackid"
 
 
 def check_references(model: Model) -> None:
@@ -42,8 +39,6 @@ def check_references(model: Model) -> None:
         if not item.path:
             _used(model, item.object, item.rank, "a build item")
     model.where = Location
-    if schema.PRODUCTION in (model.namespaces.get(prefix) for prefix in model.required):
-        _uuids(model)
 
 
 def _line_of(thing: Resource | Use) -> Location:
@@ -74,9 +69,6 @@ def _object(model: Model, resource: Object) -> None:
         _in_range(model, int(resource.attributes["pindex"]), len(group.members), f"pindex of {who}")
     if resource.mesh is not None:
         _mesh(model, resource, resource.mesh)
-    if resource.lattice is not None:
-        _lattice(model, resource, resource.lattice)
-    _sliced(model, resource)
 
 
 def _group(model: Model, id_: int, rank: int, who: str) -> Resource | None:
@@ -101,10 +93,9 @@ def _in_range(model: Model, index: int, count: int, what: str) -> None:
 
 def _mesh(model: Model, resource: Object, mesh: Triangles) -> None:
     who, rows, n = f"object {resource.id}", mesh.rows, len(mesh.vertices)
-    solid = resource.type in SOLID and resource.lattice is None
     if n < 3 and not resource.other_shape:
         model.add(P017, f"the mesh of {who} has {counted(n, 'vertex', 'vertices')}")
-    if len(rows) < (4 if solid and resource.type == "model" else 1) and resource.lattice is None:
+    if len(rows) < (4 if resource.type == "model" else 1) and not resource.other_shape:
         model.add(P017, f"the mesh of {who} has {counted(len(rows), 'triangle')}")
     corners = rows[:, :3]
     outside = np.flatnonzero((corners >= n).any(axis=1))
@@ -146,12 +137,6 @@ def _triangle_properties(model: Model, resource: Object, rows: Ints) -> None:
 
 def _property(model: Model, resource: Resource) -> None:
     who = f"{resource.kind} {resource.id}"
-    display = resource.attributes.get("displaypropertiesid")
-    if display is not None:
-        _earlier(model, int(display), resource.rank, who, "displayproperties")
-    for name in _TEXTURED:
-        if name in resource.attributes:
-            _earlier(model, int(resource.attributes[name]), resource.rank, who, "texture2d")
     if resource.kind == "texture2dgroup":
         _earlier(model, int(resource.attributes["texid"]), resource.rank, who, "texture2d")
     elif resource.kind == "compositematerials":
@@ -161,15 +146,13 @@ def _property(model: Model, resource: Resource) -> None:
                 _in_range(model, int(text), len(base.members), f"an index of {who}")
     elif resource.kind == "multiproperties":
         _multi(model, resource)
-    elif resource.kind == "slicestack":
-        _slicestack(model, resource, resource.id in _solid_stacks(model))
 
 
 def _earlier(model: Model, id_: int, rank: int, who: str, kind: str) -> Resource | None:
     resource = model.resources.get(id_)
     if resource is None and id_ in model.foreign:
         return None
-    if resource is None or not resource.kind.endswith(kind):
+    if resource is None or resource.kind != kind:
         model.add(P019, f"{who} names {id_} as {kind}, which is not there")
         return None
     if resource.rank > rank:
@@ -205,109 +188,6 @@ def _multi(model: Model, resource: Resource) -> None:
         for index, group in zip(indices, groups, strict=False):
             if group is not None:
                 _in_range(model, index, len(group.members), f"an index of {who}")
-
-
-def _solid_stacks(model: Model) -> set[int]:
-    """Return slice stacks of objects that must be solids: their polygons must be closed."""
-    named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in SOLID)
-    return {int(text) for text in named if schema.resource_id(text)}
-
-
-def _slicestack(model: Model, resource: Resource, solid: bool) -> None:
-    """Check slice 1.0: heights rise from zbottom; slices or references, not both; polygons name vertices that exist."""
-    who = f"slicestack {resource.id}"
-    kinds = {member[""] for member in resource.members}
-    if {"slice", "sliceref"} <= kinds:
-        model.add(P017, f"{who} has slices and references")
-    height = float(resource.attributes.get("zbottom", 0))
-    count, start, last = 0, -1, -1
-
-    def close_polygon() -> None:
-        if solid and start >= 0 and last != start:
-            model.add(P017, f"a polygon of {who} is open")
-
-    for member in resource.members:
-        kind = member[""]
-        if kind == "slice":
-            close_polygon()
-            top = float(member["ztop"])
-            if top < height or (top == height and count):
-                model.add(P017, f"the heights of {who} do not rise")
-            height, count, start = top, 0, -1
-        elif kind == "vertex":
-            count += 1
-        elif kind == "polygon":
-            close_polygon()
-            start = last = int(member["startv"])
-            _in_range(model, start, count, f"a start vertex of {who}")
-        elif kind == "segment":
-            if int(member["v2"]) == last:
-                model.add(P017, f"a segment of {who} has no length")
-            last = int(member["v2"])
-            _in_range(model, last, count, f"a segment's vertex in {who}")
-        elif kind == "sliceref":
-            path = member.get("slicepath", "")
-            if path.lower().lstrip("/") == model.part:
-                model.add(P019, f"{who} refers to its own part")
-    close_polygon()
-
-
-def _sliced(model: Model, resource: Object) -> None:
-    stack = resource.attributes.get(_STACK)
-    resolution = resource.attributes.get(f"{schema.SLICE} meshresolution", "fullres")
-    who = f"object {resource.id}"
-    if resolution not in ("fullres", "lowres"):
-        model.add(P017, f"mesh resolution {resolution[:40]!r} of {who}")
-    if stack is not None:
-        if not schema.resource_id(stack):
-            model.add(P017, f"slice stack {stack[:40]!r} of {who} is no id")
-        else:
-            _earlier(model, int(stack), resource.rank, who, "slicestack")
-
-
-def _lattice(model: Model, resource: Object, lattice: dict[str, str]) -> None:
-    """Check beam lattice 1.2: ends exist and differ, sets name beams that exist, clipping meshes come earlier."""
-    who, count = f"the lattice of object {resource.id}", 0 if resource.mesh is None else len(resource.mesh.vertices)
-    if resource.type not in SOLID:
-        model.add(P017, f"{who} is in an object of type {resource.type}")
-    for beam in resource.beams:
-        ends = int(beam["v1"]), int(beam["v2"])
-        if ends[0] == ends[1]:
-            model.add(P017, f"a beam of {who} has the same start and end")
-        _in_range(model, max(ends), count, f"a beam's end in {who}")
-        if "r2" in beam and "r1" not in beam:
-            model.add(P017, f"a beam of {who} has r2 without r1")
-    for ball in resource.balls:
-        _in_range(model, int(ball["vindex"]), count, f"a ball's vertex in {who}")
-    for index in resource.beam_refs:
-        _in_range(model, index, len(resource.beams), f"a beam set's index in {who}")
-    if lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in lattice:
-        model.add(P019, f"{who} clips without a clipping mesh")
-    for name in [name for name in ("clippingmesh", "representationmesh") if name in lattice]:
-        other = model.resources.get(int(lattice[name]))
-        if not isinstance(other, Object) or other.rank >= resource.rank:
-            model.add(P019, f"the {name} of {who} is no earlier object")
-        elif other.lattice is not None or other.components:
-            model.add(P019, f"the {name} of {who} is no plain mesh")
-    for holder, names in ((lattice, ["pindex"]), *((beam, ["p1", "p2"]) for beam in resource.beams)):
-        group = _group(model, int(holder["pid"]), resource.rank, who) if "pid" in holder else None
-        for name in names:
-            if group is not None and name in holder:
-                _in_range(model, int(holder[name]), len(group.members), f"a property index in {who}")
-
-
-def _uuids(model: Model) -> None:
-    """Check production 1.1: with the extension required, build, items, objects and components carry a UUID."""
-    missing = [] if model.build_uuid or not model.has_build else ["the build"]
-    if any(not item.uuid for item in model.items):
-        missing.append("an item")
-    for resource in model.objects().values():
-        if f"{schema.PRODUCTION} UUID" not in resource.attributes:
-            missing.append(f"object {resource.id}")
-        if any(not use.uuid for use in resource.components):
-            missing.append(f"a component of object {resource.id}")
-    if missing:
-        model.add_lenient(P017, f"no UUID for {', '.join(missing[:3])}")
 
 
 Key = tuple[str, int]
@@ -420,7 +300,8 @@ def _times(first: Floats, then: Floats) -> Floats:
         return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
 
 
-_IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
+_IMAGES = ("image/png", "image/jpeg", "image/jpg")
+_TEXTURE_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 
 
@@ -470,7 +351,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         if package.content_type(part) != opc.MODEL_TYPE:
             package.add(P001, f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
         try:
-            model = read_model(package.chunks(part), part, limits, faces, strict=package.strict)
+            model = read_model(package.read(part), part, limits, package.deadline.tick, faces, strict=package.strict)
         except OutOfTime:
             raise
         except Unreadable as stop:
@@ -489,10 +370,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
 def _linked_parts(model: Model) -> dict[str, str]:
     """Return the parts that a model names by path, each as it is written there."""
     uses = [*model.items, *(use for resource in model.objects().values() for use in resource.components)]
-    paths = {use.path for use in uses if use.path}
-    for resource in model.resources.values():
-        paths |= {member["slicepath"] for member in resource.members if "slicepath" in member}
-    return {path.lower().lstrip("/"): path.lstrip("/") for path in sorted(paths)}
+    return {use.path.lower().lstrip("/"): use.path.lstrip("/") for use in uses if use.path}
 
 
 def _singletons(package: Package, relations: list[Relation], who: str, kinds: tuple[str, ...]) -> None:
@@ -513,27 +391,13 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
                 package.xml(relation.target, F003)
 
 
-def _image(package: Package, part: str, rule: Rule) -> None:
+def _image(package: Package, part: str, rule: Rule, *types: str) -> None:
+    """Add a finding if a part's content type is none of an image, or of `types`."""
     content_type = package.content_type(part)
     if content_type is None:
         package.add(P001, f"{package.shown(part)} has no content type", part)
-        return
-    if content_type not in _IMAGES and not (
-        rule is P019 and content_type == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
-    ):
+    elif content_type not in (*_IMAGES, *types):
         package.add(rule, f"{package.shown(part)} has type {content_type!r}, not PNG's or JPEG's", part)
-        return
-    try:
-        kind, why = image_kind(package.chunks(part))
-    except OutOfTime:
-        raise
-    except Unreadable as stop:
-        package.findings += stop.findings
-        return
-    if why:
-        package.add(rule, f"{package.shown(part)}: {why}", part)
-    elif content_type in _IMAGES and kind != _IMAGES[content_type]:
-        package.add(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {content_type}", part)
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
@@ -551,8 +415,10 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
         elif part not in (by_kind[opc.TEXTURE] if resource.kind == "texture2d" else images):
             add = package.add if resource.kind == "texture2d" else package.add_lenient
             add(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
+        elif resource.kind == "texture2d":
+            _image(package, part, P019, _TEXTURE_TYPE)
         else:
-            _image(package, part, P019 if resource.kind == "texture2d" else P020)
+            _image(package, part, P020)
     for part, written in sorted(_linked_parts(model).items()):
         if part not in package.parts:
             package.add(P012, f"{written} is not in the package", model.part)

@@ -1,8 +1,8 @@
 """glTF 2.0 in one binary file (GLB), as Khronos defines it: the triangles of the scene, each node in its place.
 
 glTF counts in metres with y up; meshes come out in mm with z up, that is x, -z, y, rounded to float32, which is the
-format's precision. Materials, textures, skins, morph targets and animations are left out. Compression such as Draco's,
-sparse accessors and buffers outside the file are refused, never skipped.
+format's precision. Materials, textures, skins, morph targets and animations are left out. Strips and fans, compression
+such as Draco's, sparse accessors and buffers outside the file are refused, never skipped.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from unitcad.meshcheck.rules.p_package import P007, P009, P011, P012, P013, P016
 _MOST_JSON = 100_000_000  # bytes
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_TRIANGLES, _STRIP = 4, 5
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization", "KHR_xmp")
+_TRIANGLES = 4
+_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
 _NAME = 100  # characters of a name that are kept
 _Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _Count = Annotated[int, msgspec.Meta(ge=0, lt=2**53)]
@@ -63,7 +63,6 @@ class _Accessor(msgspec.Struct, rename="camel"):
     type: str
     buffer_view: int | None = None
     byte_offset: _Count = 0
-    normalized: bool = False
     sparse: object = None
 
 
@@ -183,7 +182,9 @@ def _parts(document: _Document, limits: Limits, findings: list[Finding]) -> Iter
             if placed > limits.max_instances:
                 raise F011.unreadable(f"more primitives than the limit of {limits.max_instances} instances")
             name = (node.name or mesh.name or name)[:_NAME]
-            yield from (_Part(primitive, matrix, name) for primitive in mesh.primitives if primitive.mode >= _TRIANGLES)
+            if any(primitive.mode > _TRIANGLES for primitive in mesh.primitives):
+                raise F003.unreadable(f"{name} has strips or fans, which cannot be read; export triangles")
+            yield from (_Part(primitive, matrix, name) for primitive in mesh.primitives if primitive.mode == _TRIANGLES)
         waiting += [(child, matrix, depth + 1) for child in reversed(node.children)]
 
 
@@ -257,7 +258,7 @@ def _declared_counts(document: _Document, primitive: _Primitive) -> tuple[int, i
     corners = points = _entry(document.accessors, primitive.attributes["POSITION"], "accessors", "a primitive").count
     if primitive.indices is not None:
         corners = _entry(document.accessors, primitive.indices, "accessors", "a primitive").count
-    return (corners // 3 if primitive.mode == _TRIANGLES else corners), points
+    return corners // 3, points
 
 
 def _primitive(document: _Document, binary: memoryview, part: _Part) -> tuple[Floats, Ints]:
@@ -273,17 +274,10 @@ def _primitive(document: _Document, binary: memoryview, part: _Part) -> tuple[Fl
         if len(wrong := corners[(corners < 0) | (corners >= len(points))]):
             text = f"a face names vertex {wrong[0]} of {len(points)}, counted from 0"
             raise P011.unreadable(text, places=part.place)
-    if primitive.mode == _TRIANGLES:
-        if len(corners) % 3:
-            text = f"{len(corners)} corners of triangles, which is no multiple of three"
-            raise F008.unreadable(text, places=part.place)
-        return points.astype(np.float64), corners.reshape(-1, 3)
-    rows = np.arange(max(len(corners) - 2, 0))
-    if primitive.mode == _STRIP:  # each other triangle turns the other way
-        places = np.stack([rows, rows + 1 + rows % 2, rows + 2 - rows % 2], axis=1)
-    else:
-        places = np.stack([rows + 1, rows + 2, 0 * rows], axis=1)
-    return points.astype(np.float64), corners[places]
+    if len(corners) % 3:
+        text = f"{len(corners)} corners of triangles, which is no multiple of three"
+        raise F008.unreadable(text, places=part.place)
+    return points.astype(np.float64), corners.reshape(-1, 3)
 
 
 def _numbers(document: _Document, binary: memoryview, index: int, kind: str, width: int) -> Floats:
@@ -314,7 +308,4 @@ def _numbers(document: _Document, binary: memoryview, index: int, kind: str, wid
     if not count:
         return np.empty((0, width))
     first = view.byte_offset + accessor.byte_offset
-    numbers = np.ndarray((count, width), dtype, binary, first, (stride, dtype.itemsize))
-    if kind == "VEC3" and accessor.normalized and dtype.kind in "iu":
-        return np.maximum(numbers / float(np.iinfo(dtype).max), -1.0)
-    return numbers
+    return np.ndarray((count, width), dtype, binary, first, (stride, dtype.itemsize))

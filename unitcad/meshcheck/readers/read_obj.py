@@ -1,4 +1,4 @@
-"""OBJ as Wavefront's appendix B1 defines it: the polygons, with continued lines and negative indices.
+"""OBJ as Wavefront's appendix B1 defines it: the polygons, with negative indices; continued lines are refused.
 
 Texture and normals of faces, and all other statements, are skipped; materials cost nothing.
 """
@@ -14,8 +14,8 @@ from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
-from unitcad.meshcheck.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE, Polygons, mesh_of
-from unitcad.meshcheck.rules.f_file import F005, F011, Deadline, Limits
+from unitcad.meshcheck.readers.rows import BLANK, NEWLINE, SLASH, SPACE, Polygons, mesh_of
+from unitcad.meshcheck.rules.f_file import F003, F005, F011, Deadline, Limits
 from unitcad.meshcheck.rules.p_package import P011
 
 _ANY = re.compile(rb"(?m)^[ \t]*(?:v|f|o|g|mtllib|usemtl|#)\s")
@@ -41,7 +41,9 @@ def read_obj(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
     raw = rows.plain(bytes(data), findings)
     if not _ANY.search(raw):
         raise F005.unreadable("named .obj, but has no line of one")
-    raw = raw.replace(b"\\\n", b" \v")
+    if (continued := raw.find(b"\\\n")) >= 0:
+        place = [Location(line=raw.count(b"\n", 0, continued) + 1)]
+        raise F003.unreadable("a line goes on in the next one, which cannot be read; export unwrapped lines", 1, place)
     state = _Read()
     for block, line in rows.blocks(raw, 0, deadline):
         _take(block, line, state)
@@ -80,7 +82,7 @@ def _take(block: Ints, line: int, state: _Read) -> None:
         chosen = np.zeros(len(counts), bool)
         chosen[lines[ours]] = True
         kept = np.repeat(chosen, widths)
-        kept |= (text == NEWLINE) | (text == JOINED)
+        kept |= text == NEWLINE
         kept[keys[ours]] = False
         return lines[ours], np.where(kept, text, np.uint8(SPACE))
 

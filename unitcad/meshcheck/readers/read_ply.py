@@ -1,8 +1,7 @@
 """PLY as Greg Turk defined it (Stanford, 1994), text and binary of either byte order.
 
 Elements stand in the header's order, records without padding, lists with a count of their own before them. Of all that
-a file holds, `x`, `y` and `z` of `vertex` and `vertex_indices` (or `vertex_index`) of `face` and of `tristrips` are
-kept.
+a file holds, `x`, `y` and `z` of `vertex` and `vertex_indices` (or `vertex_index`) of `face` are kept.
 """
 
 from __future__ import annotations
@@ -27,8 +26,7 @@ _TYPES |= {"float32": "f", "float64": "d"}
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _TEXT = re.compile(rb"[\r\n][ \t]*format[ \t]+ascii\b")
 _HEADER = 100_000  # bytes
-_LISTS = ("vertex_indices", "vertex_index")
-_WANTED = {"vertex": ("x", "y", "z"), "face": _LISTS, "tristrips": _LISTS}
+_WANTED = {"vertex": ("x", "y", "z"), "face": ("vertex_indices", "vertex_index")}
 _TICK = 100_000
 Column = tuple[Ints | None, Floats]  # lengths of lists, None for a plain property, and its numbers
 Tables = dict[str, dict[str, Column]]  # the wanted columns of each element
@@ -63,39 +61,15 @@ def read_ply(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
 
 
 def _polygons(elements: list[_Element], tables: Tables, lines: Ints | None) -> Polygons:
-    given = [element.name for element in elements if element.name in ("face", "tristrips") and element.count]
-    if not given:
+    if not any(element.name == "face" and element.count for element in elements):
         raise F001.unreadable("the file has no face")
     points = [tables.get("vertex", {}).get(axis, (None, None)) for axis in "xyz"]
-    lists = [next(iter(tables[name].values()), (None, np.empty(0))) for name in given]
-    if any(sizes is None for sizes, _ in lists) or any(column is None or of is not None for of, column in points):
+    sizes, corners = next(iter(tables["face"].values()), (None, np.empty(0)))
+    if sizes is None or any(column is None or of is not None for of, column in points):
         raise F003.unreadable("cannot be read as PLY: its elements are not those of a mesh")
     vertices = np.stack([np.asarray(column, np.float64) for _, column in points], axis=1)
-    polygons = []
-    for name, (sizes, corners) in zip(given, lists, strict=True):
-        assert sizes is not None
-        indices = rows.integers(corners) if corners.dtype.kind == "f" else corners.astype(np.int64)
-        polygons.append((sizes, indices) if name == "face" else _strips(sizes, indices))
-    sizes, indices = (np.concatenate(part) for part in zip(*polygons, strict=True))
-    return Polygons(vertices, indices, sizes, Source(lines=lines if given == ["face"] else None))
-
-
-def _strips(sizes: Ints, corners: Ints) -> tuple[Ints, Ints]:
-    """Return the sizes and corners of the triangles of strips: every other one is turned, and -1 begins a new strip.
-
-    Triangles with a vertex twice only lead from one strip to the next.
-    """
-    begins, place = np.zeros(len(corners) + 1, bool), np.arange(len(corners))
-    begins[np.cumsum(sizes) - sizes] = True
-    begins[1:] |= corners < 0
-    first = np.maximum.accumulate(np.where(begins[:-1], place, 0))
-    last = np.flatnonzero((place - first >= 2) & (corners >= 0))
-    triangles = np.stack([corners[last - 2], corners[last - 1], corners[last]], axis=1)
-    turned = (last - first[last]) % 2 == 1
-    triangles[turned, :2] = triangles[turned, 1::-1]
-    a, b, c = triangles.T
-    triangles = triangles[(a != b) & (b != c) & (c != a)]
-    return np.full(len(triangles), 3), triangles.reshape(-1)
+    indices = rows.integers(corners) if corners.dtype.kind == "f" else corners.astype(np.int64)
+    return Polygons(vertices, indices, sizes, Source(lines=lines))
 
 
 def _header(raw: bytes) -> tuple[str, list[_Element], int]:

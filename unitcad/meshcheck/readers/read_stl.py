@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
 from unitcad.geometry.arrays import Floats
-from unitcad.meshcheck.findings import SHOWN, Finding, Location, counted
+from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.readers import rows
 from unitcad.meshcheck.readers.rows import NOT_FINITE_BYTES, NUMBER
@@ -112,16 +113,11 @@ class _Text:
     normals: list[Floats] = field(default_factory=list)
     facets: int = 0
     solids: int = 0
-    nested: int = 0
-    nested_at: list[int] = field(default_factory=list)
 
 
 def _read_text(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
     state = _Text(findings)
     _walk(_decode(data.obj if isinstance(data.obj, bytes) else bytes(data), findings), state, limits, deadline)
-    if state.nested:  # one finding for all of them: a file may have a hundred thousand
-        places = [Location(line=line) for line in state.nested_at]
-        findings.append(F003.finding("solid begins before the last one ended", state.nested, places))
     if not state.facets:
         raise F001.unreadable("the file has no facet")
     if state.solids > 1:
@@ -155,9 +151,9 @@ def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
         word = raw[at : at + 8].split(None, 1)[0].lower()
         if word.startswith(b"solid"):
             if inside:
-                state.nested += 1
-                if state.nested <= SHOWN:
-                    state.nested_at.append(_line(raw, at))
+                state.findings.append(_at(F003, "solid begins before the last one ended", raw, at))
+                state.corners.clear()
+                return
             inside, state.solids, at = True, state.solids + 1, line_end
         elif word == b"endsolid":
             inside, at = False, line_end
@@ -203,7 +199,7 @@ def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadlin
         block = raw[at:cut]
         tokens = block.lower().split()
         if len(tokens) % _TOKENS or any(set(tokens[i::_TOKENS]) != {word} for i, word in _WORDS.items()):
-            _explain(raw, at, cut, state, limits)
+            _explain(raw, at, cut, tokens, state)
             return -1
         _take(block, tokens, state, limits)
         at = cut
@@ -237,57 +233,37 @@ def _slow_numbers(texts: list[bytes], state: _Text) -> Floats:
     return values
 
 
-def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> None:
-    """Read one irregular block token by token up to the first one that breaks the grammar, and end the reading.
-
-    Facets with more or fewer vertices than three (F008) and words in a number's place (F004) break it no further.
-    """
+def _explain(raw: bytes, at: int, cut: int, tokens: list[bytes], state: _Text) -> None:
+    """Say which word of a block breaks the grammar; that ends the reading."""
     state.corners.clear()  # a mesh of the text before would only blame the wrong thing
     state.normals.clear()
-    place, vertices, start = 0, 0, at
-    for match in _WORD.finditer(raw, at, cut):
-        word, here = match.group().lower(), match.start()
-        wanted = (b"vertex",) if place == _LOOP_END and vertices < 3 else _GRAMMAR[place]
-        if place in (_VERTEX, _LOOP_END) and word in (b"vertex", b"endloop"):
-            place = _VERTEX if word == b"vertex" else _LOOP_END
-        elif (
-            word != wanted[0]
-            if wanted
-            else word in _KEYWORDS or not (NUMBER.fullmatch(word) or NOT_FINITE_BYTES.fullmatch(word))
-        ):
-            fixed = wanted or word in _KEYWORDS
-            if match.end() == len(raw) and (not fixed or any(whole.startswith(word) for whole in wanted)):
-                break  # the text was cut within the word
-            if fixed:
-                shown, expected = word[:30].decode("utf-8", "replace"), b" or ".join(wanted).decode() or "a number"
-                state.findings.append(_at(F003, f"{shown!r} where {expected} belongs", raw, here))
-                return
-            state.findings.append(not_a_number(word, [Location(line=_line(raw, here))]))
-        if place == 0:
-            start, vertices = here, 0
-            state.facets += 1
-        vertices += place == _VERTEX
-        if place == _LOOP_END and vertices != 3:
-            state.findings.append(_at(F008, f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
-        place = (place + 1) % len(_GRAMMAR)
-        if len(state.findings) > 50 or state.facets > limits.max_faces:
-            return
-    else:
-        if place == 0:
-            return
-    if raw[cut:].strip():
+    wrong = next((i for i, word in enumerate(tokens) if _breaks(i % _TOKENS, word)), len(tokens))
+    place = wrong % _TOKENS
+    first = wrong - place
+    state.facets += first // _TOKENS + 1
+    starts = [match.start() for match in islice(_WORD.finditer(raw, at, cut), wrong + 1)]
+    wanted = _WORDS.get(place, b"a number") if place else b"facet or endsolid"
+    word = tokens[wrong] if wrong < len(tokens) else b""
+    if {word, wanted} == {b"vertex", b"endloop"}:
+        rest = tokens[first:]
+        vertices = rest[: rest.index(b"endloop") if b"endloop" in rest else None].count(b"vertex")
+        state.findings.append(_at(F008, f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, starts[first]))
+    elif word and not (starts[-1] + len(word) == len(raw) and any(text.startswith(word) for text in wanted.split())):
+        shown = word[:30].decode("utf-8", "replace")
+        state.findings.append(_at(F003, f"{shown!r} where {wanted.decode()} belongs", raw, starts[-1]))
+    elif raw[cut:].strip():
         state.findings.append(_at(F003, "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
     else:
         inside = "inside a facet" if place else "before endsolid"
         state.findings.append(_at(F003, f"the text ends {inside}", raw, len(raw.rstrip())))
 
 
-_GRAMMAR: tuple[tuple[bytes, ...], ...] = (
-    *((b"facet", b"endsolid"), (b"normal",), (), (), (), (b"outer",), (b"loop",)),
-    *((b"vertex",), (), (), (), (b"endloop",), (b"endfacet",)),
-)  # words of a facet by place; no name: a number
-_VERTEX, _LOOP_END = 7, 11  # places in it
-_KEYWORDS = {words[0] for words in _GRAMMAR if words}
+def _breaks(place: int, word: bytes) -> bool:
+    """Return whether a word may not stand at its place in a facet; what is no number is found later."""
+    return word != _WORDS[place] if place in _WORDS else word in _KEYWORDS
+
+
+_KEYWORDS = set(_WORDS.values())
 _WORD = re.compile(rb"\S+")
 
 

@@ -41,18 +41,16 @@ from unitcad.meshcheck.rules.t_topology import unreferenced
 from unitcad.meshcheck.rules.v_values import faces_not_finite
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
-_MICROSOFT = r"1\.#(?:(?:ind|inf|qnan|snan)\w*(?:[+-]\d+)?|(?:io|j|qo|r)\d*)"  # rounded, INF is J and QNAN is R
-NOT_FINITE = rf"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|{_MICROSOFT})"
+NOT_FINITE = r"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?)"
 """How programs write a number that is not finite, in either case."""
+_MICROSOFT = re.compile(rb"\b1\.#(?:ind|inf|[qs]nan)\w*", re.IGNORECASE)  # not a comment
 NOT_FINITE_BYTES = re.compile(NOT_FINITE.encode(), re.IGNORECASE)
-_WITH_HASH = re.compile(rf"(?<![^\s+-]){_MICROSOFT}(?!\S)".encode(), re.IGNORECASE)
 _INTEGER = re.compile(rb"[+-]?\d{1,18}")
 _WORD = re.compile(rb"\S+")
 BLOCK = 2_000_000
 UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 """Byte order marks with which a text in UTF-16 begins."""
 NEWLINE, HASH, SLASH, SPACE = 10, 35, 47, 32
-JOINED = 11  # a vertical tab stands where a line was continued
 
 
 def table_of(characters: bytes) -> Bools:
@@ -85,10 +83,7 @@ class Rows:
 
 
 def plain(raw: bytes, findings: list[Finding]) -> bytes:
-    """Return a text in UTF-8 with LF line ends and without a byte order mark; an odd encoding is a finding.
-
-    Numbers that Microsoft's programs write with a #, which are not finite, become nan: a # begins a comment.
-    """
+    """Return a text in UTF-8 with LF line ends and without a byte order mark; an odd encoding is a finding."""
     if raw.startswith(UTF16):
         findings.append(F009.finding("UTF-16 text with a byte order mark"))
         raw = raw.decode("utf-16", "replace").encode()
@@ -99,9 +94,7 @@ def plain(raw: bytes, findings: list[Finding]) -> bytes:
         if b"\n" not in raw:
             findings.append(F009.finding("CR-only line ends"))
         raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if b".#" in raw:
-        raw = _WITH_HASH.sub(b"nan", raw)
-    return raw.replace(b"\v", b" ")
+    return _MICROSOFT.sub(b"nan", raw)
 
 
 def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
@@ -113,7 +106,7 @@ def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[t
         piece = raw[at:cut]
         block = np.frombuffer(piece if piece.endswith(b"\n") else piece + b"\n", np.uint8)
         yield block, line
-        line += int(np.count_nonzero((block == NEWLINE) | (block == JOINED)))
+        line += int(np.count_nonzero(block == NEWLINE))
         at = cut
 
 
@@ -146,12 +139,7 @@ def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | Non
     if values is None:
         values = _slowly(block, line, integers)
     used = np.flatnonzero(np.diff(ends, prepend=0)) if which is None else which
-    lines = line + used
-    joined = np.flatnonzero(block == JOINED)
-    if len(joined):
-        begins = np.concatenate([[0], np.flatnonzero(block == NEWLINE)])[used]
-        lines = lines + np.searchsorted(joined, begins)
-    return Rows(values, np.concatenate([[0], ends[used]]), lines)
+    return Rows(values, np.concatenate([[0], ends[used]]), line + used)
 
 
 def all_rows(raw: bytes, at: int, line: int, deadline: Deadline, *, comments: bool) -> Rows:
@@ -249,7 +237,7 @@ def _slowly(block: Ints, line: int, integers: bool) -> Floats:
         word = match.group()
         finite = (_INTEGER if integers else NUMBER).fullmatch(word)
         if not finite and (integers or not NOT_FINITE_BYTES.fullmatch(word)):
-            place = [Location(line=line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v")))]
+            place = [Location(line=line + text.count(b"\n", 0, match.start()))]
             if integers:
                 shown = word[:30].decode("utf-8", "replace")
                 raise F004.unreadable(f"{shown!r} is not a vertex's index", places=place)

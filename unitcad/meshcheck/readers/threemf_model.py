@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from array import array
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Location
 from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.rows import NEWLINE, NOT_FINITE, SPACE, numbers_of, table_of
-from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, stream
+from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, parse
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.f_file import F004, F011, Limits, Unreadable, not_a_number
 from unitcad.meshcheck.rules.p_package import P010, P013, P015, P016, P017, P018
@@ -24,14 +24,15 @@ from unitcad.meshcheck.rules.v_values import V001
 _NOT_FINITE = re.compile(NOT_FINITE, re.ASCII | re.IGNORECASE)
 
 
-def coordinate(text: str, model: Model, line: int) -> float:
-    """Return the number of an attribute's text; NaN for one that is not finite, 0 with a finding for no number."""
-    text = text.strip(" \t\r\n")
-    if schema.number(text):
-        return float(text)
-    if _NOT_FINITE.fullmatch(text):
-        return math.nan
-    model.add(F004, not_a_number(text).message, line=line)
+def coordinate(text: str, model: Model) -> float:
+    """Return the number of an attribute's text; 0, with a finding, if it is none or is not finite as float32."""
+    value = float(text) if schema.number(text) else math.nan
+    if abs(value) <= LARGEST:
+        return value
+    if schema.number(text) or _NOT_FINITE.fullmatch(text.strip(" \t\r\n")):
+        model.add(V001, "a vertex is not a finite float32 number")
+    else:
+        model.add(F004, not_a_number(text.strip(" \t\r\n")).message)
     return 0.0
 
 
@@ -58,122 +59,84 @@ def transform(text: str | None, model: Model) -> Floats:
     return identity
 
 
-_BLOCK = 1 << 18
-_OPEN = re.compile(rb"<(vertices|triangles)>")
-_LONGEST_TAG = len(b"<triangles>")
-_HEAD = {name: re.compile(rb"[ \t\r\n]*<" + name + rb'[ \t\r\n]+(\w+)="') for name in (b"vertex", b"triangle")}
+_BLOCK = 1 << 18  # bytes that stay in the processor's cache
+_NEXT = re.compile(rb"<!--|<(vertices|triangles)>")
+_XYZ = ("x", "y", "z")
+_COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
+_LISTS = {b"vertices": (b"vertex", _XYZ), b"triangles": (b"triangle", _COLUMNS)}
+"""Elements of a list, and their attributes, of which each needs the first three."""
+_PLAIN = {
+    element: re.compile(rb'(?:\s*<%s(?:\s+[\w:.-]+="[^"<]*")*\s*/>)*\s*' % element) for element, _ in _LISTS.values()
+}
+"""Elements without content, one after the other."""
 _WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
 _AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
-_ELEMENTS = {b"vertices": b"vertex", b"triangles": b"triangle"}
-_NAMES = {b"vertex": (b"x", b"y", b"z"), b"triangle": (b"v1", b"v2", b"v3", b"p1", b"p2", b"p3", b"pid")}
-"""Attributes, of which each element needs the first three."""
-_SHORTEST = 1500  # bytes; a shorter block costs the parser less
+_SHORTEST = 1500  # bytes; a shorter list costs the parser less
 _LONGEST_GAP = 200  # bytes between two numbers
 _MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
 _QUOTE = ord('"')
-
-
 _DIGITS = table_of(b"0123456789")
 _IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
 
 
-@dataclass(frozen=True)
-class UniformBlock:
-    """The elements of a uniform block.
+def cut_lists(data: bytes) -> tuple[bytes, list[tuple[int, Floats | Ints]]]:
+    """Return a part without uniform blocks of its lists, and these blocks with their places in the rest, in order.
 
-    columns: the numbers (n,) of each attribute by its name; lines: the line (n,) of each element, 0 for the one on
-    which the block begins; line_ends: how many there are in the block.
+    All text between the numbers of a uniform block repeats. Vertices are (n, 3), triangles (m, 8). Line ends stay, so
+    that the parser counts them.
     """
-
-    columns: dict[str, Floats | Ints]
-    lines: Ints
-    line_ends: int
-
-
-class Reader(Protocol):
-    """A reader of the elements that the parser reports."""
-
-    def inside(self, fed: int) -> tuple[int, str]:
-        """Return the number of open elements and the name of the innermost one if it belongs to the core.
-
-        The name is empty while the parser holds back some of the `fed` bytes.
-        """
-        ...
-
-    def take(self, name: str, found: UniformBlock) -> bool:
-        """Keep the elements of a list; return False if they have to be read one by one."""
-        ...
-
-
-def rest_for_parser(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
-    """Yield what the parser has to read of a part. It must have parsed each piece before it asks for the next one."""
-    left, held, at, fed, open_list = iter(chunks), b"", 0, 0, b""  # `at` bytes of `held` are done
-    while True:
-        if not open_list:
-            found = _OPEN.search(held, at)
-            if found is None:
-                last = held.rfind(b"<", max(len(held) - _LONGEST_TAG, at))  # of a tag that may go on in the next chunk
-                cut = len(held) if last < 0 else last
-            else:
-                cut = found.start()
-            if cut > at:
-                yield held[at:cut]
-                fed, at = fed + cut - at, cut
-            if found is None:
-                chunk = next(left, b"")
-                if not chunk:
-                    break
-                held, at = held[at:] + chunk, 0
-                continue
-            depth, _ = reader.inside(fed)
-            yield found.group()
-            fed, at = fed + len(found.group()), found.end()
-            if reader.inside(fed) == (depth + 1, found.group(1).decode()):
-                open_list = found.group(1)
-            elif at < len(held):  # in a comment, for example: one full of tags would take long, tag by tag
-                yield held[at:]
-                fed, held, at = fed + len(held) - at, b"", 0
+    cut: list[tuple[int, Floats | Ints]] = []
+    if b"<![" in data or data.count(b"<?") > 1 or data.count(b"\r") != data.count(b"\r\n"):
+        return data, cut
+    pieces, size, at, line, place = list[bytes](), 0, 0, 1, 0
+    while found := _NEXT.search(data, place):
+        end = data.find(b"-->" if found[1] is None else b"</", found.end())
+        if end < 0:
+            break
+        place = end if found[1] is None else found.end()
+        if end - place < _SHORTEST:
             continue
-        while len(held) - at < _BLOCK and held.find(b"</", at) < 0 and (chunk := next(left, b"")):
-            held, at = held[at:] + chunk, 0
-        end = held.find(b"</", at, at + _BLOCK)
-        cut = held.rfind(b"/>", at, end if end >= 0 else at + _BLOCK) + 2
-        if cut < 2:
-            open_list = b""
-            continue
-        block, at = held[at:cut], cut
-        uniform = read_uniform(block, _ELEMENTS[open_list]) if len(block) >= _SHORTEST else None
-        if uniform is not None and reader.take(open_list.decode(), uniform):
-            block = b"\n" * uniform.line_ends
-            if block:
-                yield block
-            fed += len(block)
-            continue
-        yield block
-        fed += len(block)
-        # A comment or a section of characters may hold what looks like elements.
-        if b"<!" in block or b"<?" in block or reader.inside(fed)[1] != open_list.decode():
-            open_list = b""
-    if at < len(held):
-        yield held[at:]
+        for begin, stop, block in _blocks_of(data, place, end, *_LISTS[found[1]]):
+            line += data.count(b"\n", at, begin)
+            if block.shape[1] > LINE:
+                block[:, LINE] += line
+            ends = data.count(b"\n", begin, stop)
+            pieces += [data[at:begin], b"\n" * ends]
+            size += begin - at
+            cut.append((size, block))
+            size, line, at = size + ends, line + ends, stop
+    return b"".join([*pieces, data[at:]]), cut
 
 
-def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
-    """Return the elements of a block, `vertex` or `triangle`, or None if the block is not uniform.
+def _blocks_of(
+    data: bytes, at: int, end: int, element: bytes, known: tuple[str, ...]
+) -> list[tuple[int, int, Floats | Ints]]:
+    """Return the uniform blocks of a list with their ends; none if there is more in it than elements without content.
 
-    In a uniform block all text between the numbers repeats, and each attribute is one of the core's.
+    Blocks in which an element needs a finding are left to the parser.
     """
-    if b"\r" in block and block.count(b"\r") != block.count(b"\r\n"):
-        return None
-    head = _HEAD[element].match(block)
+    blocks, last = [], data.rfind(b"/>", at, end) + 2
+    while at < last:
+        stop = data.rfind(b"/>", at, min(at + _BLOCK, last)) + 2
+        text = data[at:stop]
+        values = _read_block(text, element, known)
+        if values is not None:
+            blocks.append((at, stop, values))
+        elif not text or _PLAIN[element].fullmatch(text) is None:
+            return []
+        at = stop
+    return [] if data[at:end].strip() else blocks
+
+
+def _read_block(block: bytes, element: bytes, known: tuple[str, ...]) -> Floats | Ints | None:
+    """Return the vertices or triangles of a block, with lines counted from its first; None if it is not uniform."""
+    head = re.match(rb"[ \t\r\n]*<" + element + rb'[ \t\r\n]+(\w+)="', block)
     if head is None:
         return None
-    names = [head.group(1)]
-    at = head.end()
+    names, at = [head[1].decode()], head.end()
     while within := _WITHIN.match(block, block.find(b'"', at)):
-        names.append(within.group(1))
+        names.append(within[1].decode())
         at = within.end()
-    known = _NAMES[element]
     if len(set(names)) < len(names) or not set(known[:3]) <= set(names) <= set(known):
         return None
     text = np.frombuffer(block, np.uint8)
@@ -182,17 +145,20 @@ def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
     if len(quotes) % each or _AFTER.fullmatch(block, int(quotes[-1])) is None:
         return None
     quotes = quotes.reshape(-1, each)
-    begin, end = quotes[:, ::2] + 1, quotes[:, 1::2]
     if not _same_between(text, quotes, block, head.group()):
         return None
-    numbers = _numbers(text, begin, end, whole=element == b"triangle")
+    numbers = _numbers(text, quotes[:, ::2] + 1, quotes[:, 1::2], whole=known is _COLUMNS)
     if numbers is None:
         return None
-    line_ends = np.flatnonzero(text == NEWLINE)
+    if known is _XYZ:
+        values = numbers[:, [names.index(axis) for axis in known]]
+        return values if (np.abs(values) <= LARGEST).all() else None
+    values = np.full((len(numbers), LINE + 1), -1)
+    values[:, [known.index(name) for name in names]] = numbers
     first = block.index(b"<")
     starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
-    lines = np.searchsorted(line_ends, starts)
-    return UniformBlock({name.decode(): numbers[:, i] for i, name in enumerate(names)}, lines, len(line_ends))
+    values[:, LINE] = np.searchsorted(np.flatnonzero(text == NEWLINE), starts)
+    return values if values[:, LINE - 1].all() else None  # no resource has the id 0
 
 
 def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
@@ -231,7 +197,6 @@ def _numbers(text: Ints, begin: Ints, end: Ints, *, whole: bool) -> Floats | Int
     return None if values is None else values.reshape(begin.shape)
 
 
-_BATCH = 50_000
 _DEPTH = 60
 
 
@@ -244,7 +209,6 @@ class _Open:
     rules: schema.ElementSchema | None
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
-    told: bool = False
 
 
 # Text that programs write for a missing name. Other unprefixed names pass: consumers ignore them (core, 3.4.1).
@@ -254,23 +218,18 @@ _PLACEHOLDERS = {"undefined", "null"}
 class _Reader:
     """Handlers for expat; its state is the stack of open elements and the object or resource being read."""
 
-    def __init__(self, model: Model, limits: Limits, spent_faces: int) -> None:
-        self.model, self.limits, self.faces = model, limits, spent_faces
-        self.parser = new_parser()
-        self.parser.buffer_text = False  # the line of a text is that of its event
-        self.parser.CharacterDataHandler = self.text_inside
+    def __init__(self, model: Model, limits: Limits, spent_faces: int, cut: list[tuple[int, Floats | Ints]]) -> None:
+        self.model, self.limits, self.faces, self.cut = model, limits, spent_faces, cut[::-1]
+        self.parser = new_parser(self.start, self.end)
+        self.parser.StartNamespaceDeclHandler = self.namespace
         model.where = self._where
         self.stack: list[_Open] = [_Open("", "", None)]
         self.skip = 0
         self.rank = self.uses = 0
         self.resource: Resource | None = None
         self.names: set[str] = set()
-        self.numbers: list[str] = []
-        self.lines: list[int] = []
+        self.numbers, self.indices = array("d"), array("q")
         self.vertices: list[Floats] = []
-        self.n_vertices = 0
-        self.beyond = False
-        self.triangles: list[tuple[int, ...]] = []
         self.rows: list[Ints] = []
 
     def _where(self) -> Location:
@@ -280,50 +239,11 @@ class _Reader:
     def namespace(self, prefix: str | None, uri: str) -> None:
         self.model.namespaces[prefix or ""] = uri
 
-    def inside(self, fed: int) -> tuple[int, str]:
-        """Return the number of open elements and the name of the innermost one if it belongs to the core.
-
-        The name is empty while the parser holds back some of the `fed` bytes.
-        """
-        last = self.stack[-1]
-        whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == schema.CORE
-        return len(self.stack) + self.skip, last.name if whole else ""
-
-    def take(self, name: str, found: UniformBlock) -> bool:
-        """Keep the elements of a uniform block; return False if one of them needs a finding."""
-        if name == "vertices":
-            values = np.stack([found.columns[axis] for axis in _XYZ], axis=1)
-            if not (np.abs(values) <= LARGEST).all():
-                return False
-            self._flush_vertices()
-            self._keep_vertices(values)
-            return True
-        if "pid" in found.columns and not found.columns["pid"].all():
-            return False
-        self._flush_triangles()
-        rows = np.full((len(found.lines), LINE + 1), -1)
-        for i, column in enumerate(_COLUMNS):
-            if column in found.columns:
-                rows[:, i] = found.columns[column]
-        rows[:, LINE] = self.parser.CurrentLineNumber + found.lines
-        self.rows.append(rows)
-        self.rank += len(rows)
-        self._count_faces(len(rows))
-        return True
-
     def start(self, name: str, flat: list[str]) -> None:
         if self.skip:
             self.skip += 1
             if self.skip > _DEPTH:
                 raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
-            return
-        above = self.stack[-1]
-        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
-            self.numbers += flat[1::2]
-            self.lines.append(self.parser.CurrentLineNumber)
-            self.stack.append(_LEAF)
-            if len(self.numbers) >= 3 * _BATCH:
-                self._flush_vertices()
             return
         if len(self.stack) > _DEPTH:
             raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
@@ -348,27 +268,20 @@ class _Reader:
         if good:
             self._take(space, local, attributes)
 
-    def text_inside(self, text: str) -> None:
-        """Find fault with text in an element that holds none."""
-        above = self.stack[-2] if self.stack[-1] is _LEAF else self.stack[-1]
-        if not self.skip and not above.told and above.name not in ("", "metadata") and text.strip(" \t\r\n"):
-            above.told = True
-            self.model.add_lenient(P017, f"text inside <{above.name}>")
-
     def end(self, _: str) -> None:
         if self.skip:
             self.skip -= 1
+            while self.cut and self.cut[-1][0] <= self.parser.CurrentByteIndex:
+                self.cut.pop()
             return
         done = self.stack.pop()
-        if done is _LEAF or done.rules is None:
+        if done.rules is None:
             return
         for child, least, _most in done.rules.children:
             if done.counts.get(child, 0) < least:
                 self.model.add(P017, f"<{done.name}> lacks <{child}>")
-        if done.space == schema.CORE and done.name == "vertices":
-            self._flush_vertices()
-        elif done.space == schema.CORE and done.name == "triangles":
-            self._flush_triangles()
+        if done.space == schema.CORE and done.name in ("vertices", "triangles"):
+            self._take_blocks()
         elif done.space == schema.CORE and done.name == "mesh":
             self._close_mesh()
         elif done.name == "object" and isinstance(self.resource, Object):
@@ -379,9 +292,6 @@ class _Reader:
     def _child(self, space: str, local: str, rules: schema.ElementSchema | None) -> None:
         """Check that this child may stand here, and in this order."""
         parent = self.stack[-1]
-        if parent is _LEAF:
-            self.model.add(P017, f"<{local}> inside <vertex>")
-            return
         if not parent.name:
             if (space, local) != (schema.CORE, "model"):
                 raise P017.unreadable(f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
@@ -404,9 +314,7 @@ class _Reader:
                 self.model.add(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
-        if space in (schema.CORE, schema.MATERIAL, schema.SLICE, schema.BEAM) and not (
-            rules is not None and parent.name == "resources"
-        ):
+        if rules is None or parent.name != "resources":
             self.model.add(P017, f"<{local}> inside <{parent.name}>")
 
     def _attributes(self, local: str, rules: schema.ElementSchema, attributes: dict[str, str]) -> bool:
@@ -443,8 +351,6 @@ class _Reader:
                 return
         if "id" in attributes and parent == "resources":
             self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
-        elif space == schema.BEAM or space == schema.BALLS:
-            self._take_lattice(local, attributes)
         elif self.resource is not None and not isinstance(self.resource, Object):
             self.resource.members.append({"": local, **attributes})
             if len(self.resource.members) > self.limits.max_faces:
@@ -488,12 +394,22 @@ class _Reader:
         kind = attributes.get("type", "model")
         self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
+    def _take_blocks(self) -> None:
+        """Keep the blocks that were cut out in front of what the parser reports."""
+        while self.cut and self.cut[-1][0] <= self.parser.CurrentByteIndex:
+            self._flush()
+            _, block = self.cut.pop()
+            if block.shape[1] > LINE:
+                self.rows.append(block)
+                self._count_faces(len(block))
+            else:
+                self.vertices.append(block)
+
     def _take_triangle(self, attributes: dict[str, str]) -> None:
-        row = tuple(int(attributes.get(name, -1)) for name in _COLUMNS)
-        self.triangles.append((*row, self.parser.CurrentLineNumber))
+        self._take_blocks()
+        self.indices.extend(int(attributes.get(name, -1)) for name in _COLUMNS)
+        self.indices.append(self.parser.CurrentLineNumber)
         self._count_faces(1)
-        if len(self.triangles) >= _BATCH:
-            self._flush_triangles()
 
     def _count_faces(self, number: int) -> None:
         self.faces += number
@@ -501,8 +417,8 @@ class _Reader:
             raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
 
     def _take_vertex(self, attributes: dict[str, str]) -> None:
-        self.numbers += [attributes["x"], attributes["y"], attributes["z"]]
-        self.lines.append(self.parser.CurrentLineNumber)
+        self._take_blocks()
+        self.numbers.extend(coordinate(attributes[axis], self.model) for axis in _XYZ)
 
     def _take_component(self, attributes: dict[str, str]) -> None:
         if isinstance(self.resource, Object):
@@ -513,70 +429,26 @@ class _Reader:
 
     def _take_build(self, attributes: dict[str, str]) -> None:
         self.model.has_build = True
-        self.model.build_uuid = f"{schema.PRODUCTION} UUID" in attributes
 
     def _use(self, attributes: dict[str, str]) -> Use:
         self.uses += 1
         if self.uses > self.limits.max_instances:
             raise F011.unreadable(f"more items and components than the limit of {self.limits.max_instances} instances")
-        uuid = attributes.get(f"{schema.PRODUCTION} UUID")
-        if uuid is not None and not schema.uuid(uuid):
-            self.model.add(P017, f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{schema.PRODUCTION} path", "")
         matrix = transform(attributes.get("transform"), self.model)
-        return Use(
-            int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
-        )
+        return Use(int(attributes["objectid"]), path, matrix, self.rank, self.parser.CurrentLineNumber)
 
-    def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
-        if not isinstance(self.resource, Object):
-            return
-        if local == "beamlattice":
-            self.resource.lattice = attributes
-        elif local == "beam":
-            self.resource.beams.append(attributes)
-        elif local == "ball":
-            self.resource.balls.append(attributes)
-        elif local == "ref":
-            self.resource.beam_refs.append(int(attributes["index"]))
-        if len(self.resource.beams) > self.limits.max_faces:
-            raise F011.unreadable("more beams than --max-faces")
-
-    def _flush_vertices(self) -> None:
-        if not self.numbers:
-            return
-        try:
-            text = "".join(self.numbers)
-            if not text.isascii() or "_" in text:  # which Python takes for a number's
-                raise ValueError(text[:40])
-            values = np.array(self.numbers, dtype=np.float64)
-        except ValueError:
-            values = np.array([coordinate(text, self.model, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
-        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
-        if len(bad):
-            if not self.beyond:
-                self.model.add(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
-            self.beyond = True
-            values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        self.numbers, self.lines = [], []
-        self._keep_vertices(values.reshape(-1, 3))
-
-    def _keep_vertices(self, values: Floats) -> None:
-        self.vertices.append(values)
-        self.n_vertices += len(values)
-        if self.n_vertices > 3 * self.limits.max_faces + 3:
-            raise F011.unreadable("more vertices than three times --max-faces")
-
-    def _flush_triangles(self) -> None:
-        if self.triangles:
-            self.rows.append(np.array(self.triangles, dtype=np.int64))
-            self.triangles = []
+    def _flush(self) -> None:
+        """Keep the vertices and triangles that the parser reported."""
+        self.vertices.append(np.array(self.numbers).reshape(-1, 3))
+        self.rows.append(np.array(self.indices).reshape(-1, LINE + 1))
+        self.numbers, self.indices = array("d"), array("q")
 
     def _close_mesh(self) -> None:
+        self._flush()
         if isinstance(self.resource, Object):
-            vertices = np.concatenate([np.empty((0, 3)), *self.vertices])
-            self.resource.mesh = Triangles(vertices, np.concatenate([np.empty((0, LINE + 1), np.int64), *self.rows]))
-        self.vertices, self.n_vertices, self.rows, self.beyond = [], 0, [], False
+            self.resource.mesh = Triangles(np.concatenate(self.vertices), np.concatenate(self.rows))
+        self.vertices, self.rows = [], []
 
     def _close_object(self, resource: Object) -> None:
         if resource.mesh is None and not resource.components and not resource.other_shape:
@@ -585,27 +457,18 @@ class _Reader:
             self.model.add(P017, f"object {resource.id} has a mesh and components")
 
 
-# Extensions whose elements take the place of an object's mesh.
-_SHAPES = {
-    schema.BOOLEAN,
-    schema.DISPLACEMENT,
-    schema.OLD_DISPLACEMENT,
-    schema.IMPLICIT,
-}
-_XYZ = ["x", "y", "z"]
-_COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
-_LEAF = _Open(schema.CORE, "vertex", None)
-_VERTEX = f"{schema.CORE} vertex"
+# Extensions whose elements take the place of an object's mesh, or stand on its vertices.
+_SHAPES = {schema.BEAM, schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT}
 
 
 def read_model(
-    chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0, *, strict: bool = False
+    data: bytes, part: str, limits: Limits, tick: Tick, spent_faces: int = 0, *, strict: bool = False
 ) -> Model:
     """Read one model part. Schema faults are the model's findings; raises `Unreadable` if XML or a limit ends it."""
     model = Model(part, strict=strict)
-    reader = _Reader(model, limits, spent_faces)
+    text, cut = cut_lists(data)
     try:
-        stream(rest_for_parser(chunks, reader), part, reader.start, reader.end, reader.namespace, reader.parser)
+        parse(_Reader(model, limits, spent_faces, cut).parser, text, part, tick)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

@@ -12,12 +12,13 @@ import posixpath
 import re
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import unquote
 from xml.parsers import expat
 
+from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.rules.f_file import F003, F006, F009, F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P006, P007, P008
@@ -26,6 +27,7 @@ from unitcad.meshcheck.rules.registry import Rule
 XML_SPACE = "http://www.w3.org/XML/1998/namespace "
 XSI = "http://www.w3.org/2001/XMLSchema-instance "
 _DEPTH = 100
+_CHUNK = 1 << 20
 _SMALL = 5_000_000  # bytes a small part may have
 
 
@@ -38,33 +40,22 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
 
-Start = Callable[[str, list[str]], Any]
-End = Callable[[str], Any]
-
-
-def new_parser() -> expat.XMLParserType:
-    """Return a parser that names elements "namespace local"."""
+def new_parser(start: Callable[[str, list[str]], Any], end: Callable[[str], Any]) -> expat.XMLParserType:
+    """Return a parser for `parse`; names are "namespace local", attributes a flat list."""
     parser = expat.ParserCreate(None, " ")
     parser.ordered_attributes = True
-    parser.buffer_text = True
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
     return parser
 
 
-def stream(
-    chunks: Iterable[bytes],
-    part: str,
-    start: Start,
-    end: End,
-    namespace: Callable[[str | None, str], Any] | None = None,
-    parser: expat.XMLParserType | None = None,
-) -> None:
-    """Feed a part to `start` and `end`; names are "namespace local", attributes a flat list.
+def parse(parser: expat.XMLParserType, data: bytes, part: str, tick: Tick) -> None:
+    """Parse a part.
 
-    A caller that needs line numbers gives the `parser`, made by `new_parser`. Raises `Unreadable`: P006 for a DTD, F009
-    (as an error) for another encoding than UTF-8, F003 for XML that is not well formed.
+    Raises `Unreadable`: P006 for a DTD, F009 (as an error) for another encoding than UTF-8, F003 for XML that is not
+    well formed.
     """
     place = [Location(part=part)]
-    parser = parser or new_parser()
 
     def refuse(*_: object) -> None:
         raise P006.unreadable("a document type declaration", places=place)
@@ -75,22 +66,16 @@ def stream(
 
     parser.XmlDeclHandler = declared
     parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.StartNamespaceDeclHandler = namespace
-    seen, chunk = 0, b""
+    if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or b"\x00" in data[:8]:
+        raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
     try:
-        for chunk in chunks:
-            if not seen and (chunk[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or b"\x00" in chunk[:8]):
-                raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
-            parser.Parse(chunk, False)
-            seen += len(chunk)
+        for at in range(0, len(data), _CHUNK):
+            tick()
+            parser.Parse(data[at : at + _CHUNK], False)
         parser.Parse(b"", True)
     except expat.ExpatError as error:
-        line = [Location(part=part, line=error.lineno)]
-        at = parser.ErrorByteIndex - seen
-        if 0 <= at < len(chunk) and any(byte > 127 for byte in chunk[at : at + 4]):
+        line, at = [Location(part=part, line=error.lineno)], parser.ErrorByteIndex
+        if any(byte > 127 for byte in data[at : at + 4]):
             raise F009.unreadable("bytes that are not UTF-8", places=line, severity="error") from error
         raise F003.unreadable(f"XML not well formed: {expat.ErrorString(error.code)}", places=line) from error
 
@@ -104,8 +89,8 @@ def forbidden(name: str) -> str | None:
     return None
 
 
-def read_small(chunks: Iterable[bytes], part: str) -> Element:
-    """Return a whole small part as a tree. Raises `Unreadable` as `stream` does, and for parts over 5 MB."""
+def read_small(data: bytes, part: str, tick: Tick) -> Element:
+    """Return a whole small part as a tree. Raises `Unreadable` as `parse` does."""
     stack: list[Element] = [Element("", {})]
 
     def start(name: str, attributes: list[str]) -> None:
@@ -115,15 +100,7 @@ def read_small(chunks: Iterable[bytes], part: str) -> Element:
         stack[-1].children.append(element)
         stack.append(element)
 
-    def bounded() -> Iterable[bytes]:
-        size = 0
-        for chunk in chunks:
-            size += len(chunk)
-            if size > _SMALL:
-                raise F011.unreadable(f"{part}: more than {_SMALL} bytes")
-            yield chunk
-
-    stream(bounded(), part, start, lambda _: stack.pop())
+    parse(new_parser(start, lambda _: stack.pop()), data, part, tick)
     return stack[0].children[0]
 
 
@@ -139,7 +116,6 @@ PRESERVE = _PACKAGE + "relationships/mustpreserve"
 KNOWN = {START, TEXTURE, TICKET, THUMBNAIL, PROPERTIES, PRESERVE}
 MODEL_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodel+xml"
 RELS_TYPE = "application/vnd.openxmlformats-package.relationships+xml"
-_CHUNK = 1 << 20
 _FREE = 1_000_000  # bytes that may inflate at any ratio
 _MEDIA = re.compile(r"^[!#$%&'*+\-.^_`|~\w]+/[!#$%&'*+\-.^_`|~\w]+(\s*;.*)?$", re.ASCII)
 _SCHEME = re.compile(r"^[A-Za-z][A-Za-z0-9+.\-]*:")
@@ -177,20 +153,22 @@ class Package:
         """Add a finding that real programs' files have: a warning unless the package is checked strictly."""
         self.add(rule, message, part, None if self.strict else "warning")
 
-    def chunks(self, name: str) -> Iterator[bytes]:
-        """Return a part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
+    def read(self, name: str, most: int | None = None) -> bytes:
+        """Return a part's bytes, at most so many. Raises `Unreadable`."""
         info = self.parts[name]
+        place = [Location(part=info.filename)]
         if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
-            raise P008.unreadable(f"{info.filename} is {what}", places=[Location(part=info.filename)])
+            raise P008.unreadable(f"{info.filename} is {what}", places=place)
+        if most is not None and info.file_size > most:
+            raise F011.unreadable(f"{info.filename}: more than {most} bytes")
+        self.spent += info.file_size
+        if self.spent > self.limits.max_package_bytes:
+            raise F011.unreadable(f"the package inflates beyond {self.limits.max_package_bytes} bytes")
+        self.deadline.tick()
         try:
-            with self.archive.open(info) as stream:
-                while piece := stream.read(_CHUNK):
-                    self.spent += len(piece)
-                    if self.spent > self.limits.max_package_bytes:
-                        raise F011.unreadable(f"the package inflates beyond {self.limits.max_package_bytes} bytes")
-                    self.deadline.tick()
-                    yield piece
+            with self.archive.open(info) as stream:  # its own `read` of all takes the square of the time
+                return b"".join(iter(lambda: stream.read(_CHUNK), b""))
         except (
             zipfile.BadZipFile,
             zlib.error,
@@ -200,8 +178,7 @@ class Package:
             RuntimeError,
             ValueError,
         ) as error:
-            text = f"{info.filename} cannot be unpacked: {error}"
-            raise F003.unreadable(text, places=[Location(part=info.filename)]) from error
+            raise F003.unreadable(f"{info.filename} cannot be unpacked: {error}", places=place) from error
 
     def shown(self, name: str) -> str:
         """Return a part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
@@ -229,7 +206,7 @@ class Package:
     def xml(self, name: str, rule: Rule) -> Element | None:
         """Return a small XML part as a tree, or None with a finding (of `rule`, or of a rule on XML)."""
         try:
-            return read_small(self.chunks(name), self.shown(name))
+            return read_small(self.read(name, _SMALL), self.shown(name), self.deadline.tick)
         except OutOfTime:
             raise
         except Unreadable as stop:
@@ -355,37 +332,3 @@ def _content_types(package: Package) -> None:
         table[name] = kind
     if "_rels/.rels" in package.parts and package.content_type("_rels/.rels") not in (RELS_TYPE, None):
         package.add(P001, "the extension rels has another type than relationships", CONTENT_TYPES)
-
-
-_SOF = {0xC0, 0xC1, 0xC2, 0xC3, 0xC5, 0xC6, 0xC7, 0xC9, 0xCA, 0xCB, 0xCD, 0xCE, 0xCF}
-_LIMIT = 4_000_000
-
-
-def image_kind(chunks: Iterable[bytes]) -> tuple[str | None, str | None]:
-    """Return `png`, `jpeg` or None, and the fault or None. Looks at the first 4 MB; pixels are not decoded."""
-    data = b""
-    for chunk in chunks:
-        if len(data) < _LIMIT:
-            data += chunk
-    if data.startswith(b"\x89PNG\r\n\x1a\n"):
-        return "png", None if data[12:16] == b"IHDR" else "a PNG without a header chunk"
-    if data.startswith(b"\xff\xd8"):
-        return "jpeg", "a CMYK JPEG" if _components(data) == 4 else None
-    return None, None
-
-
-def _components(data: bytes) -> int | None:
-    """Return the number of colour components of a JPEG's frame, or None if no frame header is found."""
-    at = 2
-    while at + 9 < len(data):
-        if data[at] != 0xFF:
-            at += 1
-            continue
-        marker = data[at + 1]
-        if marker in _SOF:
-            return data[at + 9]
-        if marker == 0xFF or 0xD0 <= marker <= 0xD9 or marker == 0x01:
-            at += 1 if marker == 0xFF else 2
-            continue
-        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
-    return None

@@ -41,7 +41,6 @@ def _pattern(pattern: str) -> Test:
 _WORD = re.compile(r"[^ \t\r\n]+")
 number = _pattern(r"[ \t\r\n]*[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?[ \t\r\n]*")
 boolean = _pattern(r"[ \t\r\n]*(?:true|false|0|1)[ \t\r\n]*")
-uuid = _pattern(r"[ \t\r\n]*[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}[ \t\r\n]*")
 color = _pattern(r"#(?:[0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})")
 part_name = _pattern(r"(?s:/.*)")
 text = _pattern(r"(?s:.*)")
@@ -51,11 +50,6 @@ _integer = _pattern(r"[ \t\r\n]*\+?\d{1,12}[ \t\r\n]*")
 def words(text: str) -> list[str]:
     """Return the words of a text between the blanks that XML knows."""
     return _WORD.findall(text)
-
-
-def positive(text: str) -> bool:
-    """Test for ST_PositiveNumber."""
-    return bool(number(text)) and float(text) >= 0
 
 
 def index(text: str) -> bool:
@@ -91,7 +85,6 @@ class ElementSchema:
 
 _MANY = _LIMIT
 _DISPLAY = {"displaypropertiesid": resource_id}
-_CAP = one_of("hemisphere", "sphere", "butt")
 _TILE = one_of("wrap", "mirror", "clamp", "none")
 _OBJECT_TYPE = one_of("model", "solidsupport", "support", "surface", "other")
 
@@ -131,7 +124,6 @@ def _core() -> dict[str, ElementSchema]:
 
 def _material() -> dict[str, ElementSchema]:
     id_ = {"id": resource_id}
-    named = {"name": text}
     return {
         "colorgroup": ElementSchema(id_, _DISPLAY, (("color", 1, _MANY),)),
         "color": ElementSchema({"color": color}),
@@ -151,76 +143,12 @@ def _material() -> dict[str, ElementSchema]:
             (("multi", 1, _MANY),),
         ),
         "multi": ElementSchema({"pindices": many(index)}),
-        "pbspeculardisplayproperties": ElementSchema(id_, {}, (("pbspecular", 1, _MANY),)),
-        "pbspecular": ElementSchema(named, {"specularcolor": color, "glossiness": number}),
-        "pbmetallicdisplayproperties": ElementSchema(id_, {}, (("pbmetallic", 1, _MANY),)),
-        "pbmetallic": ElementSchema(named, {"metallicness": number, "roughness": number}),
-        "pbspeculartexturedisplayproperties": ElementSchema(
-            id_ | named | {"speculartextureid": resource_id, "glossinesstextureid": resource_id},
-            {"diffusefactor": color, "specularfactor": color, "glossinessfactor": number},
-        ),
-        "pbmetallictexturedisplayproperties": ElementSchema(
-            id_ | named | {"metallictextureid": resource_id, "roughnesstextureid": resource_id},
-            {"basecolorfactor": color, "metallicfactor": number, "roughnessfactor": number},
-        ),
-        "translucentdisplayproperties": ElementSchema(id_, {}, (("translucent", 1, _MANY),)),
-        "translucent": ElementSchema(
-            named | {"attenuation": many(number)}, {"refractiveindex": many(number), "roughness": number}
-        ),
-    }
-
-
-def _slice() -> dict[str, ElementSchema]:
-    props = {"p1": index, "p2": index, "pid": resource_id}
-    return {
-        "slicestack": ElementSchema(
-            {"id": resource_id}, {"zbottom": number}, (("slice", 0, _MANY), ("sliceref", 0, _MANY)), ordered=False
-        ),
-        "slice": ElementSchema({"ztop": number}, {}, (("vertices", 0, 1), ("polygon", 0, _MANY))),
-        "sliceref": ElementSchema({"slicestackid": resource_id, "slicepath": part_name}),
-        "vertices": ElementSchema(children=(("vertex", 2, _MANY),)),
-        "vertex": ElementSchema({"x": number, "y": number}),
-        "polygon": ElementSchema({"startv": index}, {}, (("segment", 1, _MANY),)),
-        "segment": ElementSchema({"v2": index}, props),
-    }
-
-
-def _beam() -> dict[str, ElementSchema]:
-    props = {"p1": index, "p2": index, "pid": resource_id, "cap1": _CAP, "cap2": _CAP}
-    ball = {"vindex": index}
-    lattice = {
-        "clippingmode": one_of("none", "inside", "outside"),
-        "clippingmesh": resource_id,
-        "representationmesh": resource_id,
-        "pid": resource_id,
-        "pindex": index,
-        "cap": _CAP,
-        "ballmode": one_of("none", "mixed", "all"),
-        "ballradius": positive,
-    }
-    return {
-        "beamlattice": ElementSchema(
-            {"minlength": positive, "radius": positive},
-            lattice,
-            (("beams", 1, 1), ("balls", 0, 1), ("beamsets", 0, 1)),
-        ),
-        "beams": ElementSchema(children=(("beam", 0, _MANY),)),
-        "beam": ElementSchema({"v1": index, "v2": index}, {"r1": positive, "r2": positive} | props),
-        "balls": ElementSchema(children=(("ball", 0, _MANY),)),
-        "ball": ElementSchema(ball, {"r": positive, "p": index, "pid": resource_id}),
-        "beamsets": ElementSchema(children=(("beamset", 0, _MANY),)),
-        "beamset": ElementSchema({}, {"name": text, "identifier": text}, (("ref", 0, _MANY), ("ballref", 0, _MANY))),
-        "ref": ElementSchema({"index": index}),
-        "ballref": ElementSchema({"index": index}),
     }
 
 
 ELEMENTS: dict[str, dict[str, ElementSchema]] = {
     CORE: _core(),
     MATERIAL: _material(),
-    SLICE: _slice(),
-    BEAM: _beam(),
-    BALLS: {name: rules for name, rules in _beam().items() if name in ("balls", "ball", "ballref")},
 }
 
 
@@ -248,7 +176,6 @@ class Use:
     path: str
     matrix: Floats
     rank: int
-    uuid: bool
     line: int | None = None
 
 
@@ -267,10 +194,6 @@ class Object(Resource):
     type: str = "model"
     mesh: Triangles | None = None
     components: list[Use] = field(default_factory=list)
-    lattice: dict[str, str] | None = None
-    beams: list[dict[str, str]] = field(default_factory=list)
-    balls: list[dict[str, str]] = field(default_factory=list)
-    beam_refs: list[int] = field(default_factory=list)
     other_shape: bool = False
 
 
@@ -287,7 +210,6 @@ class Model:
     foreign: set[int] = field(default_factory=set)
     findings: list[Finding] = field(default_factory=list)
     has_build: bool = False
-    build_uuid: bool = False
     strict: bool = False
     where: Callable[[], Location] = Location
 

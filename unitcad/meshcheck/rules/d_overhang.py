@@ -38,7 +38,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
         return
     topology = part.topology
     mesh, areas = topology.mesh, topology.areas
-    bed = float(mesh.vertices[np.unique(mesh.faces), 2].min())
+    bed = float(mesh.vertices[mesh.faces, 2].min())
     double = np.sqrt(np.einsum("ij,ij->i", areas, areas))
     steep = -np.sin(np.radians(min(float(printer.overhang_deg) + _SLACK, 89.0)))
     leaning = areas[:, 2] < steep * double

@@ -23,16 +23,13 @@ F001 = Rule("""
     Fix: Export again and look at the size of the file.
 """)
 
-F002 = Rule(
-    """
+F002 = Rule("""
     F002 error: facet count does not match the size
     The count in a binary STL's header asks for more or fewer 50-byte records than the file holds, or a PLY or an OFF
     promises more elements than it has. A reader that trusts either number reads rubbish.
     Example: A binary STL of 12 facets was cut after 400 bytes, which have room for 6.
     Fix: Copy or export the file again; a file cut short in transfer cannot be repaired.
-""",
-    count_is_size=True,
-)
+""")
 
 F003 = Rule("""
     F003 error: truncated text, XML or zip
@@ -57,16 +54,13 @@ F005 = Rule("""
     Fix: Fetch the real file (git lfs pull, gunzip, the download link behind the page), rename it, or export a mesh.
 """)
 
-F006 = Rule(
-    """
+F006 = Rule("""
     F006 warning: trailing bytes
     Bytes follow the last facet, endsolid, the last element that a PLY or OFF promises, or a zip's end record. Readers
     ignore them, or count facets from the size and disagree.
     Example: A binary STL has 16 bytes of a checksum after its last facet.
     Fix: Export again, or cut the file after its last facet.
-""",
-    count_is_size=True,
-)
+""")
 
 F007 = Rule("""
     F007 warning: binary header starts with solid

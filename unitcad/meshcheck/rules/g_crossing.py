@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints, among, distinct
-from unitcad.meshcheck.findings import Finding, Location, counted, detail, point
+from unitcad.geometry.arrays import Floats, Ints, among
+from unitcad.meshcheck.findings import Finding, Location, counted, most_locations, point
 from unitcad.meshcheck.geometry.crossings import (
     Crossings,
     Faces,
@@ -23,7 +23,7 @@ from unitcad.meshcheck.geometry.crossings import (
 )
 from unitcad.meshcheck.geometry.mesh import float32_step, same_place
 from unitcad.meshcheck.geometry.predicates import common_point
-from unitcad.meshcheck.geometry.topology import Topology, edges_of, turns_of
+from unitcad.meshcheck.geometry.topology import edges_of, turns_of
 from unitcad.meshcheck.rules.g_shells import SPECK
 from unitcad.meshcheck.rules.inspection import Inspection, at_edges
 from unitcad.meshcheck.rules.registry import Rule
@@ -80,7 +80,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     crossings = part.crossings
     if crossings.faces is not None:
         yield from _pairs(part, crossings, crossings.faces)
-        yield from _touching(part.topology, crossings, crossings.faces)
+        yield from _touching(crossings, crossings.faces)
     if crossings.stopped is not None:
         raise crossings.stopped
     yield from _along_edges(part)
@@ -88,7 +88,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
 
 def _pairs(part: Inspection, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
     """Return pairs of faces that cross or cover each other."""
-    topology, places = part.topology, partial(_places, part.topology, faces)
+    topology, places = part.topology, partial(_places, faces)
     crossing, covering = join_pairs(crossings.crossing), join_pairs(crossings.covering)
     opposite = facing(faces, covering[:, 0], covering[:, 1]) < 0
     twice, thin = kinds(topology, faces.shell[covering], opposite)
@@ -129,44 +129,28 @@ def _by_depth(
         yield rule.finding(text, int(which.sum()), places(found[which]), severity)
 
 
-def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
+def _touching(crossings: Crossings, faces: Faces) -> Iterator[Finding]:
     """Return pairs of shells whose faces meet and do not cross."""
     contact = crossings.contact
     keys, touching = contact.pairs()
-    first = np.flatnonzero(distinct(keys))
-    first = first[~among(keys[first], np.sort(contact.keys(*faces.shell[join_pairs(crossings.crossing)].T)))]
+    first = np.flatnonzero(~among(keys, np.sort(contact.keys(*faces.shell[join_pairs(crossings.crossing)].T))))
     n = len(first)
     if not n:
         return
-
-    def region(at: int) -> tuple[Ints, tuple[float, float, float]]:
-        """Return the faces of a pair of shells that touch, and the middle of the common part of their boxes."""
-        key = keys[first[at]]
-        begin, end = np.searchsorted(keys, [key, key + 1])
-        shells = contact.shells_of(keys[begin : begin + 1])[0]
-        x, y, z = (topology.low[shells].max(axis=0) + topology.high[shells].min(axis=0)).tolist()
-        return faces.original[np.unique(touching[begin:end])], (x / 2, y / 2, z / 2)
-
-    places = _places(topology, faces, touching[first], region)
     some = " among those compared" if contact.full else ""
-    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, places)
+    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, _places(faces, touching[first]))
 
 
-def _places(
-    topology: Topology,
-    faces: Faces,
-    pairs: Ints,
-    region: Callable[[int], tuple[Ints, tuple[float, float, float]]] | None = None,
-) -> list[Location]:
+def _places(faces: Faces, pairs: Ints) -> list[Location]:
     """List the points at which pairs meet, no point twice, with both faces; first the one that was not named before."""
     by_place: dict[tuple[int, ...], Location] = {}
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
-    listed = max(_LISTED, detail().locations)
+    listed = max(_LISTED, most_locations())
     chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
     corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)]
     names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
-    for at, (a, b), (one, other) in zip(chosen.tolist(), corners, names, strict=True):
+    for (a, b), (one, other) in zip(corners, names, strict=True):
         common = common_point(a, b)
         xyz = point((a.mean(axis=0) if common is None else common) + 0.0)  # no -0
         near = tuple(round(v / grid) for v in xyz)
@@ -174,8 +158,7 @@ def _places(
             continue
         first, second = (other, one) if one in named else (one, other)
         named.add(first)
-        drawn, centre = region(at) if region else (None, None)
-        by_place[near] = Location(faces=(first, second), xyz=xyz, region=drawn, centre=centre)
+        by_place[near] = Location(faces=(first, second), xyz=xyz)
     return sorted(by_place.values(), key=lambda place: place.face or 0)
 
 

@@ -29,15 +29,12 @@ G002 = Rule("""
     Fix: Unite the bodies with a boolean.
 """)
 
-G005 = Rule(
-    """
+G005 = Rule("""
     G005 warning: shell count other than expected
     The file has more or fewer shells than --shells or the manifest says: a loose chip, or a lost piece.
     Example: `--shells 1` for a file that holds a part and a chip beside it.
     Fix: Look for loose pieces.
-""",
-    count_is_size=True,
-)
+""")
 
 G006 = Rule("""
     G006 warning: closed cavity

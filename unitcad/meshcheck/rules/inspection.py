@@ -9,7 +9,7 @@ from typing import Any, Protocol, SupportsFloat
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Tick
-from unitcad.meshcheck.findings import SHOWN, Location, detail, point
+from unitcad.meshcheck.findings import Location, point
 from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.geometry.rays import Rays, cast
@@ -71,14 +71,12 @@ def at_region(faces: Ints, xyz: Floats) -> Location:
 class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
-    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other. `strict`:
-    whether crossings too shallow for a printer are errors.
+    `tick` is called now and then by what takes long. `strict`: whether crossings too shallow for a printer are errors.
     """
 
     mesh: Mesh
     topology: Topology
     tick: Tick
-    cross: bool = True
     printer: Printer | None = None
     strict: bool = False
 
@@ -89,10 +87,8 @@ class Inspection:
 
     @cached_property
     def crossings(self) -> Crossings:
-        """How its faces meet each other; nothing where they are not compared."""
-        if not self.cross or not len(self.topology.kept):
-            return Crossings()
-        return crossings_of(self.topology, self.tick, every=detail().meshes is not None)
+        """How its faces meet each other."""
+        return crossings_of(self.topology, self.tick) if len(self.topology.kept) else Crossings()
 
     @cached_property
     def material(self) -> Rays:
@@ -109,10 +105,10 @@ class Options:
     `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
     that ended the check of a file (not readable, a limit reached, no mesh) is always kept.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
-    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict`: crossings too shallow for
-    a printer are errors too. `strict_3mf`: content that the 3MF specification forbids and common programs write is an
-    error, not a warning. `unwanted`: prefixes of codes that no select brings back. `locations`: how many are kept of a
-    finding; `draw`: keep meshes with the report.
+    `shells`: the number of shells expected (G005). `strict`: crossings too shallow for a printer are errors too.
+    `strict_3mf`: content that the 3MF specification forbids and common programs write is an error, not a warning.
+    `unwanted`: prefixes of codes that no select brings back. `draw`: keep the meshes with the report, and more places,
+    for pictures.
     """
 
     select: tuple[str, ...] = ()
@@ -120,12 +116,10 @@ class Options:
     unit: str | None = None
     printer: Printer | None = None
     shells: int | None = None
-    cross: bool = True
     strict: bool = False
     strict_3mf: bool = False
     limits: Limits = field(default_factory=Limits)
     unwanted: tuple[str, ...] = ()
-    locations: int = SHOWN
     draw: bool = False
 
     def wants(self, code: str) -> bool:

@@ -84,7 +84,7 @@ P010 = Rule("""
 
 P011 = Rule("""
     P011 error: index out of range
-    A triangle, beam, polygon or property index points past the end of its list, or before its start (OBJ counts from
+    A triangle, polygon or property index points past the end of its list, or before its start (OBJ counts from
     1).
     Example: A triangle has `v3="8"` in a mesh of 8 vertices, which are counted from 0.
     Fix: Export again; the list and its users were written apart.
@@ -130,8 +130,8 @@ P016 = Rule("""
 P017 = Rule("""
     P017 error: against the schema
     An element or attribute is missing, unknown, repeated, out of order, of the wrong type, or forbidden (xml:space, xsi
-    attributes), or text stands between elements. Such text, an unknown attribute without a prefix, metadata of one name
-    and a missing UUID are warnings, unless --3mf-strict is given, since common programs write such files.
+    attributes). An unknown attribute without a prefix and metadata of one name are warnings, unless --3mf-strict is
+    given, since common programs write such files.
     Example: A `<triangle>` has v1 and v2, and no v3.
     Fix: Write the element by its 3MF schema.
 """)

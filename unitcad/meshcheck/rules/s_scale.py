@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from unitcad.errors import WrongArgument, unknown_name
 from unitcad.geometry.arrays import extent
 from unitcad.meshcheck.findings import Facts, Finding, number
@@ -67,7 +65,7 @@ def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:
 def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     """Apply S002 to the box of the mesh as it stands."""
     mesh = part.topology.mesh
-    low, high = extent(mesh.vertices[np.unique(mesh.faces)])
+    low, high = extent(mesh.vertices[mesh.faces.reshape(-1)])
     size = high - low
     x, y, z = float(printer.bed_x_mm), float(printer.bed_y_mm), float(printer.bed_z_mm)
     upright = size[2] <= z

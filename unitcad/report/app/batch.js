@@ -47,10 +47,7 @@
     return svg && el("img", { className: "thumbnail", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: "", loading: "lazy" });
   };
 
-  // A word of a command, as a POSIX shell reads it.
-  const quoted = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
-
-  // {sections, chips, plot, ask}: `plot` draws once the sections are on a page; `ask(folder)` is for a variant that is not on it. why(folder, column) says why a level is missing,
+  // {sections, chips, plot}: `plot` draws once the sections are on a page. why(folder, column) says why a level is missing,
   // variant(folder) gives a record.
   function batchOf(data, why, variant) {
     const { batch } = data;
@@ -107,18 +104,11 @@
     // A batch of estimates alone has no folders.
     const failed = table.rows.filter((row) => !row[0] && !(table.columns.includes("status") && row[at("status")] === "ok")).length;
     const chips = [geometries > 0 && el("span", { className: "chip" }, `${geometries} ${geometries === 1 ? "geometry" : "geometries"}`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
-    const lacking = el("p", { className: "lacking", role: "status" });
-    // Says how the folder of a variant is made that the page was opened for and has none.
-    const ask = (folder) => {
-      const there = folder && table.rows.some((row) => row[0] === folder);
-      clear(lacking, there && [`${folder} has no folder here. To make it, and then this page again, run in the folder that holds ${data.stored_in}: `,
-        el("code", {}, `unitcad export ${folder.split("-").pop()} --batch ${quoted(data.stored_in)} && unitcad report ${quoted(data.stored_in)}`)]);
-    };
-    const sections = [section("variants", "Variants", lacking, made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];
+    const sections = [section("variants", "Variants", made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];
     if (data.damaged.length) sections.push(section("damaged", "Damaged", U.table(["Result", "Why"], data.damaged, { label: "Damaged results" })));
     if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "Properties of the batch"), U.facts(batch))));
     ready = true;
-    return { sections, chips, plot, ask };
+    return { sections, chips, plot };
   }
 
   Object.assign(window.unitcad, { batch: batchOf, records, variantAsked });

@@ -208,9 +208,7 @@
   }
 
   function printing() {
-    const { casting, slicer } = data;
-    const sliced = slicer && `${slicer.slicer}: ${duration(slicer.print_s / 60)}, ${number(slicer.filament_cm3, 3)} cm³ of filament.`;
-    return section("print", "Print", el("ul", {}, casting.printing.how.map((text) => el("li", {}, text)), sliced && el("li", {}, sliced)));
+    return section("print", "Print", el("ul", {}, data.casting.printing.how.map((text) => el("li", {}, text))));
   }
 
   const GROUPS = { Buy: (item) => item.made === "bought", Have: (item) => item.made !== "bought" && !item.made.startsWith("printed") };

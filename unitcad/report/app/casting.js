@@ -22,14 +22,6 @@
     return el("dl", { className: "cards" }, chosen.map((figure) => el("div", {}, el("dt", {}, figure.name), el("dd", {}, quantity(figure)))));
   }
 
-  function printing(sliced) {
-    if (!sliced) return null;
-    const minutes = (seconds) => number(seconds / 60, 2);
-    const rows = sliced.pieces.map((piece) => [partName(piece.file.replace(/\.stl$/, "")), minutes(piece.print_s), shown(piece.filament_cm3)]);
-    rows.push(["all", minutes(sliced.print_s), shown(sliced.filament_cm3)]);
-    return [table(["Piece", "Print time (min)", "Filament (cm³)"], rows, { label: "Print time and filament" }), el("p", {}, `${sliced.slicer}, ${sliced.printer}, layers of ${sliced.layer_mm} mm: ${sliced.note}`)];
-  }
-
   function times(data) {
     if (!data.time_line) return null;
     const rows = data.time_line.map((phase) => [phase.name, duration(phase.start_min), duration(phase.bench_min), duration(phase.wait_min)]);
@@ -56,14 +48,14 @@
   function make(variant) {
     const data = variant.casting, { warnings } = variant.manifest;
     if (!data) return null;
-    const { plates, minutes, cm3, of, sizes } = data.printing, sliced = variant.slicer;
+    const { plates, minutes, cm3, of, sizes } = data.printing;
     const grams = new Map();
     for (const item of data.bill.filter((each) => each.unit === "g")) {
       const name = item.item.replace(/ part [AB]$/, "");
       grams.set(name, (grams.get(name) || 0) + item.quantity);
     }
     const link = (path) => el("a", { href: besides(variant.folder, path) }, path);
-    const takes = sliced ? `${duration(sliced.print_s / 60)}, ${number(sliced.filament_cm3, 3)} cm³` : `about ${duration(minutes)}, at most ${number(cm3, 2)} cm³`;
+    const takes = `about ${duration(minutes)}, at most ${number(cm3, 2)} cm³`;
     const assumed = sizes.filter((size) => size.assumed).map((size) => `${size.what} ${number(size.value_mm, 3)} mm (${size.assumed})`);
     return section("make", "Make it",
       (warnings || []).map((text) => el("p", { className: "verdict bad" }, `Warning: ${text}.`)),
@@ -111,7 +103,6 @@
       titled("Out of the mould", steps(data.release)),
       titled(data.last, steps(data.assembly)),
       titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "Effect of the cups' play on the walls", 2)),
-      titled("Printing", printing(variant.slicer)),
       titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity, 3)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
   }
 

@@ -76,9 +76,8 @@
     const batch = U.batch(data, why, variant);
     const scrolled = batch.sections[0].querySelector(".scroll");
     let left = { page: 0, across: 0, down: 0, focus: null };
-    return (asked) => {
+    return () => {
       document.title = data.title;
-      batch.ask(asked);
       clear(page, header(data.title, `unitcad ${data.version}`, batch.chips), navigation(batch.sections), batch.sections, footer(data));
       batch.plot();
       window.scrollTo(0, left.page);
@@ -104,7 +103,7 @@
       window.scrollTo(0, 0);
       if (!data.table) showVariant(resolve(data.variants[0][1]), data);
       else if (variants.has(wanted) && wanted) showVariant(resolve(variants.get(wanted)), data, el("a", { className: "back", href: "#" }, "‹ All variants"));
-      else showBatch(wanted);
+      else showBatch();
     };
     if (data.table) {
       history.scrollRestoration = "manual";

@@ -1,53 +1,22 @@
-"""Shape to build123d by its own operations, for `Variant.to_build123d()`."""
+"""Shape to build123d by its own operations, a peer of `unitcad.kernels.occt`."""
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
 
-from unitcad.errors import UnitcadError, pip_install
+import build123d as b3d
+from build123d.topology import Shape as B3dShape
+from build123d.topology import SkipClean
+
 from unitcad.kernels import brep, occt
-from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
-from unitcad.shape.tree import Body, Turn
-
-with loading("build123d"):
-    import build123d as b3d
-    from build123d.topology import Shape as B3dShape
-    from build123d.topology import SkipClean
+from unitcad.shape.tree import Turn
 
 
 def solid(shape: Shape) -> B3dShape:
     """Return the Solid of `shape`, or a Compound if it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
-
-
-def compound(bodies: Sequence[Body]) -> b3d.Compound:
-    """Return an assembly, as assembled (mm): one child a body, with its label and colour."""
-    children = _solids([body.shape for body in bodies])
-    for child, body in zip(children, bodies, strict=True):
-        child.label = body.name
-        child.color = b3d.Color(*body.colour)
-    return b3d.Compound(label="unitcad", children=children)
-
-
-def show(assembly: b3d.Compound) -> None:
-    """Show an assembly with its names and colours in ocp-vscode's viewer, or on YACV's page if only that is installed.
-
-    Raises UnitcadError without either.
-    """
-    if find_spec("ocp_vscode"):
-        import ocp_vscode
-
-        ocp_vscode.show(assembly)
-    elif find_spec("yacv_server"):
-        import yacv_server
-
-        yacv_server.show(*assembly.children, names=[child.label for child in assembly.children])
-    else:
-        raise UnitcadError(f"no viewer is installed: {shlex.join([*pip_install(), 'ocp-vscode'])} (or yacv-server)")
 
 
 def line(start: brep.Point, end: brep.Point) -> b3d.Edge:

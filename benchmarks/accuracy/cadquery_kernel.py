@@ -1,30 +1,20 @@
-"""Shape to CadQuery by its own operations, for `Variant.to_cadquery()`."""
+"""Shape to CadQuery by its own operations, a peer of `unitcad.kernels.occt`."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
 
-from unitcad.kernels import brep, occt
-from unitcad.kernels.ocp import loading
-from unitcad.shape import Shape
-from unitcad.shape.tree import Body, Turn
+import cadquery as cq
 
-with loading("cadquery"):
-    import cadquery as cq
+from unitcad.kernels import brep, occt
+from unitcad.shape import Shape
+from unitcad.shape.tree import Turn
 
 
 def solid(shape: Shape) -> cq.Shape:
     """Return the Solid of `shape`, or a Compound if it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
-
-
-def assembly(bodies: Sequence[Body], name: str = "unitcad") -> cq.Assembly:
-    """Return an assembly called `name`, as assembled (mm): one child a body, with its name and colour."""
-    whole = cq.Assembly(name=name)
-    for body, shape in zip(bodies, _solids([body.shape for body in bodies]), strict=True):
-        whole.add(shape, name=body.name, color=cq.Color(*body.colour))
-    return whole
 
 
 def line(start: brep.Point, end: brep.Point) -> cq.Edge:
