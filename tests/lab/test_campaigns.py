@@ -46,7 +46,7 @@ def folder(tmp_path):
             write(tmp_path / f"{name}{i}.wav", synthetic(scenario, rng, size * (1 + 0.02 * (i - 1)), hertz).x)
     point = '[[unit.point]]\ndistance_mm = 10.0\nrecords = ["s0.wav", "s1.wav", "s2.wav"]\n'
     text = f"{BOTH}{UNIT}{point}"
-    (tmp_path / "c.toml").write_text(NAME + HEAD + "full_scale = 500.0\n" + text)
+    (tmp_path / "c.toml").write_text(NAME + HEAD + text)
     return tmp_path
 
 
@@ -81,7 +81,7 @@ def test_the_files_of_a_campaign(folder, monkeypatch):
     assert again["levels"] == measured["level"]
 
 
-def test_a_motor_channel_gives_the_ratio_and_the_lag(tmp_path):
+def test_a_motor_channel_gives_the_ratio(tmp_path):
     """Both channels wander together: their ratio is far better known than either amplitude's mean."""
     for i in range(3):
         motor = synthetic(Scenario("m", snr=100.0, wander=0.04, drift=0.01), np.random.default_rng(i), 250.0, 118.0).x
@@ -89,7 +89,6 @@ def test_a_motor_channel_gives_the_ratio_and_the_lag(tmp_path):
     result = campaign(tmp_path, PAIRED)
     assert result.levels[0].level.value == pytest.approx(0.35, rel=2e-3)
     assert result.records["a"][1].ratio == pytest.approx(0.35, rel=1e-3)
-    assert result.records["a"][1].lag_deg == pytest.approx(-360 * 118.0 / RATE, abs=0.4)
 
 
 def test_a_levels_interval_is_welchs():
@@ -186,13 +185,6 @@ def test_a_bad_motor_channel_gives_no_level(tmp_path, code, motor):
     assert (code, "error") in found, result.findings
 
 
-def test_the_motors_range_is_its_sensors(tmp_path):
-    repeats(tmp_path, e=(wave(60), MOTOR))
-    sensor = f"{UM.replace('sensor', 'motor_sensor')}scale = 500.0\nfull_scale = 300.0\n"
-    found = {(one.code, one.where) for one in campaign(tmp_path, sensor + PAIRED).findings}
-    assert found == {*(("L101", f"e{i}.wav, motor") for i in range(3)), ("L112", "a, edge")}
-
-
 def test_two_motors_at_once_give_no_level(tmp_path):
     repeats(tmp_path, e=wave(60, 118.0) + wave(90, 126.0), m=wave(300, 118.0) + wave(150, 126.0))
     result = campaign(tmp_path, BOTH + UNIT)
@@ -200,7 +192,6 @@ def test_two_motors_at_once_give_no_level(tmp_path):
     said = {one.where: one.message for one in result.findings if one.code == "L104"}
     assert said["m0.wav"] == "another one is at about 126.1 Hz; run one motor at a time"
     assert said["e0.wav"] == "another one is at about 117.9 Hz; run one motor at a time"
-    assert all("not used" in text for text in measure_command.lines(result) if ".wav" in text)
 
 
 def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
@@ -208,16 +199,12 @@ def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
     write(tmp_path / "e1.wav", np.clip(wave(90), -30, 30))
     write(tmp_path / "e2.wav", np.where(TIME > 0.6, wave(90), 0.0) + noise())
     result = campaign(tmp_path, UNIT)
-    lines = {text.split(", ")[2].split(": ")[0]: text for text in measure_command.lines(result)}
-    assert ["+-" in lines[name] for name in ("e0.wav", "e1.wav")] == [True, False]
-    assert "not used" in lines["e1.wav"]
     data = {one["file"]: one for one in measure_command.as_data(result)["records"]}
     assert (data["e1.wav"]["usable"], data["e1.wav"]["u_um"]) == (False, None)
     page = measure_command.page(result)
     assert "<td>e1.wav</td><td>no</td><td></td>" in page
     used = f"{result.records['a'][5].steady_s:.3g}"
     assert 1.0 < float(used) < 1.4
-    assert f"121.30 Hz over {used} s of 2 s" in lines["e2.wav"]
     assert f"<td>{used} of 2</td>" in page
 
 
@@ -355,10 +342,7 @@ def test_a_motion_is_a_displacement_over_j_omega(tmp_path, table, motor, um):
     ("table", "motor", "edge", "field", "words"),
     [
         (sensor("velocity", "mm/s", "scale = 50.0\n"), "V", "mV", "sensor.per", ("mV", "V")),
-        (sensor("velocity", "mm/s", "scale = 50.0\n"), "V", "", "sensor.per", ("V", "no unit")),
-        (sensor("velocity", "mm/s", "scale = 50.0\n"), "mA", "V", "sensor.per", ("mA", "V")),
         (sensor("velocity", "mm/s", "scale = 2.0\n"), "mm/s", "um/s", "sensor.scale", ("needs no scale",)),
-        (VELOCITY, "um/s", "", "sensor.per", ("um/s", "no unit")),
         (VELOCITY, "um", "mm/s", "sensor.unit", ("um",)),
         (VELOCITY, "V", "V", "sensor.unit", ("V", "sensor.scale")),
         (VOLTS, "mm/s", "V", "sensor.per", ("mm/s", "'V'")),

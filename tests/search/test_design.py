@@ -226,13 +226,6 @@ def test_what_was_never_measured_is_said():
     assert set(notes) >= {"motor", "diameter", "walls", "frequency"}
 
 
-def test_the_measured_unit_of_the_kind_stands_beside():
-    vary = {"wall_mm": [1.5, 1.5]}
-    best = invert(_target(vary), check=False).data["proposals"][0]
-    assert best["measured"] is None
-    assert best["measured_sibling"]["level"] == 0.04
-
-
 def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known, tmp_path):
     first = design_files.contents(known, "out/design-published")
     again = design_files.contents(invert(load_target("published"), check=True), "out/design-published")

@@ -1,12 +1,10 @@
-"""An array and a campaign in the live page: the patch, its crosstalk, edits of it; the decay that was measured."""
+"""An array in the live page: the patch, its crosstalk, edits of it."""
 
 import base64
 import io
 import json
 import re
-import shutil
 import tomllib
-from pathlib import Path
 
 import pytest
 import trimesh
@@ -19,9 +17,6 @@ from unitcad.arrays.crosstalk import crosstalk, heat_map_svg, patch_map_svg
 from unitcad.arrays.patch import patch_moulds, patch_parts
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.lab import measure_command
-from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measuring import measure
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.server import serve
 from unitcad.validation import templates
@@ -29,7 +24,6 @@ from unitcad.validation import templates
 NINE = array_templates()["forearm-pockets"].read_text("utf-8")
 TEXT = NINE.replace("rows = 3", "rows = 1").replace("26.0", "8.0")
 UNIT = re.compile(r"^unit = .*$", re.MULTILINE)
-CAMPAIGN = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
 
 
 @pytest.fixture(scope="module")
@@ -179,56 +173,3 @@ def test_a_patch_is_shown_and_changed(browser, pockets):
     live.page.get_by_role("button", name="corner").click()
     assert live.page.locator(".stage canvas").screenshot() == seen
     live.close()
-
-
-def test_a_campaign_is_measured_again_after_a_save(browser, tmp_path):
-    shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
-    file = tmp_path / "lab" / CAMPAIGN.name
-    with serving(tmp_path, str(file)) as own:
-        context = browser.new_context()
-        page = context.new_page()
-        page.set_default_timeout(120_000)  # a first measurement brings in the libraries of signals
-        page.goto(own.url)
-        assert page.url == f"{own.base}/"  # the token is in no address that is copied or kept
-        assert page.locator("table").first.locator("tr").count() == 7
-        file.write_text(file.read_text("utf-8").replace('use = ["line", "bandpass"]', 'use = ["line"]'), "utf-8")
-        page.click("text=measure again")
-        page.wait_for_function("() => document.querySelector('table').rows.length === 4")
-        context.close()
-
-
-def test_a_campaign_that_is_refused_says_why_and_is_measured_again(browser, tmp_path):
-    shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
-    file = tmp_path / "lab" / CAMPAIGN.name
-    text = file.read_text("utf-8")
-    with serving(tmp_path, f"lab/{CAMPAIGN.name}") as own:
-        context = browser.new_context(color_scheme="dark")
-        page = context.new_page()
-        page.set_default_timeout(120_000)
-        for broken, why in (
-            (text.replace("motor-off.wav", "gone.wav"), "'gone.wav': no such file"),
-            (text.replace("[sensor]", "[[sensor]"), "not TOML"),
-        ):
-            file.write_text(broken, "utf-8")
-            page.goto(own.url)
-            assert page.inner_text("h1") == CAMPAIGN.name
-            assert why in page.inner_text(".error")
-            assert str(tmp_path / "lab") in page.inner_text("body")
-            assert page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(24, 26, 27)"
-            file.write_text(text, "utf-8")
-            page.click("text=measure again")
-            page.wait_for_selector("table")
-            assert page.locator(".error").count() == 0
-        context.close()
-
-
-@pytest.mark.smoke
-def test_a_campaign_opens_its_decay(tmp_path):
-    with serving(tmp_path, str(CAMPAIGN)) as own:
-        status, content, headers = own.send("/")
-    assert status == 200
-    made = measure_command.page(measure(read_campaign(CAMPAIGN), CAMPAIGN.parent))
-    assert made[made.index("<h2>Levels") :] in content.decode()
-    assert "frame-ancestors 'none'" in headers["content-security-policy"]
-    assert f"Measured from {CAMPAIGN.resolve()}" in content.decode()
-    assert list(tmp_path.iterdir()) == []

@@ -35,12 +35,6 @@ class SensorTable(Table, frozen=True, kw_only=True):
     unit: Annotated[Name, Meta(description="unit of the samples after scale, such as mm/s")]
     scale: Annotated[Positive, Meta(description="unit per volt, or per the unit in per")] = 1.0
     per: Annotated[Name | None, Meta(description="unit of the numbers in the files; default: V, or no unit")] = None
-    full_scale: Annotated[
-        Positive | None,
-        Meta(
-            description="largest value that the sensor gives, in unit; default: unitcad finds clipping in the samples"
-        ),
-    ] = None
 
 
 class RecordingTable(Table, frozen=True, kw_only=True):
@@ -131,11 +125,7 @@ def check_files(campaign: Campaign, folder: Path) -> None:
     for field, name in chain.from_iterable(by_unit):
         expect_ending(file_of(folder, name, field), field)
     for records in by_unit:
-        sizes = [(folder / name).stat().st_size for _, name in records]
         seen: dict[str, str] = {}
-        for (field, name), size in zip(records, sizes, strict=True):
-            path = folder / name
-            for key in (str(path.resolve()), *([sha256(path)] if sizes.count(size) > 1 else [])):
-                if seen.setdefault(key, field) != field:
-                    limit = f"is the record of {seen[key]} again; a repeat is a recording of its own"
-                    raise Refusal(field, name, limit)
+        for field, name in records:
+            if (before := seen.setdefault(sha256(folder / name), field)) != field:
+                raise Refusal(field, name, f"is the record of {before} again; a repeat is a recording of its own")

@@ -1,4 +1,4 @@
-"""unitcad measure: its files and page, and the page of the live server. The same input, the same bytes."""
+"""unitcad measure: its files and page. The same input, the same bytes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
-from unitcad.errors import UnitcadError
 from unitcad.export.chart import Series, chart
 from unitcad.lab import measuring
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measuring import Measured
-from unitcad.lab.record import RULES, RecordResult
+from unitcad.lab.record import RecordResult
 from unitcad.spec.toml import text_of
 
 MEASURED = "measured.toml"
@@ -86,25 +85,12 @@ def as_data(result: Measured) -> dict[str, Any]:
 
 
 def lines(result: Measured) -> Iterator[str]:
-    """Yield the levels and the records as lines for a person."""
+    """Yield the levels as lines for a person."""
     for one in result.levels:
         value = f"{one.level.value:.3f} ({one.level.low:.3f} to {one.level.high:.3f})"
         yield (
             f"{one.unit}, {_place(one.distance_mm)}, {one.chain}: {value} of the motor's amplitude, "
             f"{one.frequency_hz:.1f} Hz"
-        )
-    for unit, r in _each_record(result):
-        if not r.frequency_hz:
-            why = ", ".join(f"{one.code} {RULES[one.code].title}" for one in r.findings if one.severity == "error")
-            yield f"  {unit}, {r.role}, {r.file}: not used, {why}"
-            continue
-        gain = "".join(f", filters of {name} pass {value:.3f}" for name, value in r.gains.items())
-        ratio = f", {r.ratio:.4f} of the motor" if r.ratio is not None else ""
-        size = f"{r.amplitude_um:.4g} +- {2 * r.u_um:.2g} um" if r.usable else f"not used, {r.amplitude_um:.4g} um"
-        yield (
-            f"  {unit}, {r.role}, {r.file}: {size}{ratio}, "
-            f"{r.frequency_hz:.2f} Hz over {r.steady_s:.3g} s of {r.length_s:.3g} s, "
-            f"drift {r.drift:.2%}, signal to noise {r.snr:.3g}{gain}"
         )
     for text in _assumed(result):
         yield f"  {text}"
@@ -122,8 +108,8 @@ h1{font-size:1.4rem}table{font-size:13px}td,th{padding:.15rem .3rem}td:first-chi
 figure{overflow-x:auto}svg{max-width:none;width:31rem}}"""
 
 
-def page(result: Measured, lead: str = "") -> str:
-    """Return the page as HTML; `lead` is HTML that comes first."""
+def page(result: Measured) -> str:
+    """Return the page as HTML."""
     found = "".join(
         f'<li class="{one.severity}"><b>{one.code}</b> {escape(one.where)}: {escape(one.message)}. '
         f"{escape(one.as_dict()['fix'])}</li>"
@@ -148,7 +134,7 @@ def page(result: Measured, lead: str = "") -> str:
     head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
     return _document(
         result.campaign.name,
-        f"{lead}<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
+        f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
         + (_table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels) if levels else _NO_LEVEL)
         + "".join(f"<p>{escape(text)}.</p>" for text in _assumed(result))
         + f"{_figures(_decay_charts(result))}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
@@ -165,11 +151,6 @@ _NO_LEVEL = "<p>None: see the findings.</p>"
 def _assumed(result: Measured) -> list[str]:
     """State the assumptions of the chains that have some."""
     return [f"Chain {chain.name}, assumed: {chain.assumed_text}" for chain in result.chains if chain.assumed]
-
-
-def fault_page(name: str, fault: str, lead: str = "") -> str:
-    """Return the page of a campaign that can't be measured, as HTML: the reason, then the HTML `lead`."""
-    return _document(name, f'<h2>Not measured</h2><p class="error">{escape(fault)}</p>{lead}')
 
 
 def _document(name: str, body: str) -> str:
@@ -240,31 +221,6 @@ def _decay_charts(result: Measured) -> Iterator[str]:
 
 def _figures(charts: Iterable[str]) -> str:
     return "".join(f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>" for svg in charts)
-
-
-def measured(path: bytes) -> bytes:
-    """Return {"page": HTML} of a campaign file, or {"refused": why}. Runs in a worker process."""
-
-    file = Path(path.decode())
-    try:
-        result = measuring.measure(read_campaign(file), file.parent)
-    except UnitcadError as error:
-        return msgspec.json.encode({"refused": str(error)})
-    lead = (
-        f"<p>Measured from {escape(str(file))} as it is saved. Its recordings are files that it names by "
-        f"patterns, so it has no form here: change the file in an editor, then {_AGAIN}.</p>"
-    )
-    return msgspec.json.encode({"page": page(result, lead)})
-
-
-def refusal_page(file: Path, why: str) -> str:
-    """Return the page that says why a campaign file can't be measured, as HTML."""
-    folder, named = escape(str(file.parent)), escape(file.name)
-    lead = f"<p>The file is {named} in {folder}, with its recordings. Change it, then {_AGAIN}.</p>"
-    return fault_page(file.name, why, lead)
-
-
-_AGAIN = '<a href="/">measure again</a>'
 
 
 def measure(

@@ -25,7 +25,7 @@ from unitcad.lab.campaign import (
     check_files,
 )
 from unitcad.lab.chains import Chain, chains_of
-from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, finding, measure_record
+from unitcad.lab.record import LabFinding, RecordResult, finding, measure_record
 
 COVERAGE = 0.95
 LEAST_REPEATS = 3
@@ -115,12 +115,11 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     Raises Refusal for a file that can't be read.
     """
     check_files(campaign, folder)
-    stated: dict[SensorTable, tuple[str, str]] = {}
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
     for unit in campaign.unit:
-        records[unit.name] = tuple(one := _records(unit, campaign, folder, stated, say))
+        records[unit.name] = tuple(one := _records(unit, campaign, folder, say))
         findings += [finding for record in one for finding in record.findings]
         for role, distance, _ in sorted(_places(unit), key=itemgetter(1)):
             more, said = _levels(unit, role, distance, one, campaign)
@@ -145,7 +144,6 @@ def _records(
     unit: UnitTable,
     campaign: Campaign,
     folder: Path,
-    stated: dict[SensorTable, tuple[str, str]],
     say: Callable[[str], None],
 ) -> list[RecordResult]:
     """Measure a unit's records: the motor's first, near whose frequency the others' lines are looked for."""
@@ -156,7 +154,6 @@ def _records(
     def add(name: str, role: str, sensors: tuple[SensorTable, ...], band: tuple[float, float]) -> None:
         say(name)
         out.append(measure_record(folder / name, role, campaign, sensors, band, name))
-        expect_one_unit(stated, out[-1].units, sensors, name)
 
     for name in unit.reference:
         add(name, "reference", (motor,), band)

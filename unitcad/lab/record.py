@@ -115,7 +115,7 @@ class Signal:
     """A record's samples (n, channels) at `rate` in Hz: means of `averaged` neighbours of the file's at `raw_rate`.
 
     `count` and `missing`: samples of the file, and of each channel those that are no numbers; `off_grid`: the largest
-    distance of a time from an even grid, in steps; `units`: of each channel in the file, "" if the file gives none.
+    distance of a time from an even grid, in steps.
     """
 
     samples: Floats
@@ -124,7 +124,6 @@ class Signal:
     count: int
     missing: tuple[int, ...]
     off_grid: float
-    units: tuple[str, ...]
 
     @property
     def rate(self) -> float:
@@ -160,10 +159,9 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
             column = others[0]
         columns.append(column)
     rate, stamps = _rate(recording, table, time, columns[0], shown)
-    units = tuple(plain(channels[column].unit) for column in columns)
     factors = [
-        _factor(sensor, own, f"{shown}, {channels[column].name}")
-        for column, own, sensor in zip(columns, units, sensors, strict=True)
+        _factor(sensor, plain(channels[column].unit), f"{shown}, {channels[column].name}")
+        for column, sensor in zip(columns, sensors, strict=True)
     ]
     samples = recording.columns(columns)
     count, missing = len(samples), tuple(int(n) for n in np.count_nonzero(~np.isfinite(samples), axis=0))
@@ -174,7 +172,7 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     averaged = max(min(int(rate / HIGHEST_RATE), count), 1)
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
-    return Signal(samples, rate, averaged, count, missing, off_grid, units)
+    return Signal(samples, rate, averaged, count, missing, off_grid)
 
 
 def _off_grid(stamps: Floats, rate: float) -> float:
@@ -207,26 +205,6 @@ def _factor(sensor: SensorTable, own: str, shown: str) -> float:
         limit = f"is needed: {shown}, says {own}; is the scale per {own} or per V?"
         raise Refusal("sensor.per", None, limit, "V")
     return sensor.scale
-
-
-def expect_one_unit(
-    stated: dict[SensorTable, tuple[str, str]],
-    units: tuple[str, ...],
-    sensors: tuple[SensorTable, ...],
-    shown: str,
-) -> None:
-    """Compare the units of a record with those of the records before, which `stated` has by sensor with their unit.
-
-    Raises Refusal for two units that this program can't convert into each other, or a unit and none.
-    """
-    for own, sensor in zip(units, sensors, strict=True):
-        before, file = stated.setdefault(sensor, (own, shown))
-        alone = plain(sensor.unit) if sensor.scale == 1.0 else ""  # the unit of numbers without one
-        if sensor.per is None and own != before and ratio(own or alone, before or alone) != 1.0:
-            if own and before and ratio(own, before) is not None:
-                continue
-            told = [f"{name} gives {unit or 'no unit'}" for name, unit in ((shown, own), (file, before))]
-            raise Refusal("sensor.per", None, f"is needed: {told[0]}, {told[1]}", own or before)
 
 
 def _rate(
@@ -271,7 +249,7 @@ def _own_rate(
 
 LEAST_GAIN = 0.9
 HIGHEST_HZ = 500.0
-"""If a record's spectrum ends, in Hz."""
+"""The end of a record's spectrum, in Hz."""
 MOST_SCATTER, NO_SCATTER, MOST_DRIFT = 0.05, 0.25, 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1
@@ -293,7 +271,7 @@ class RecordResult:
 
     `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, without the
     chains that the record is not fit for; `gains` the gain of a chain's filters at the line; `picture` the
-    samples and the spectrum, in the sensor's unit; `units` the units of the channels in the file.
+    samples and the spectrum, in the sensor's unit.
     """
 
     file: str
@@ -304,7 +282,6 @@ class RecordResult:
     unit: str
     picture: tuple[Floats, Floats, Floats, Floats]
     findings: tuple[LabFinding, ...]
-    units: tuple[str, ...] = ()
     usable: bool = False
     amplitude_um: float = 0.0
     u_um: float = 0.0
@@ -314,7 +291,6 @@ class RecordResult:
     steady_s: float = 0.0
     masked: float = 0.0
     ratio: float | None = None
-    lag_deg: float | None = None
     by_chain: dict[str, float] = field(default_factory=dict)
     gains: dict[str, float] = field(default_factory=dict)
 
@@ -370,7 +346,7 @@ def measure_record(
             severity = "error" if gaps > MOST_MASKED * signal.count else "warning"
             findings.append(finding("L119", where, message, severity))
     unit = sensors[0].unit
-    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, picture, (), signal.units)
+    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, picture, ())
     if any(one.code == "L101" for one in findings):
         return replace(none, findings=tuple(findings))
     for each, where in zip(fits, names, strict=True):
@@ -389,10 +365,9 @@ def measure_record(
         findings.append(finding("L107", shown, message))
     hertz = fit.frequency_hz
     scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
-    factor, ratio, lag = abs(scales[0]), None, None
-    if motor is not None:  # displacement over the motor's, and its phase, behind the motor's if negative
-        value = fit.value * scales[0] / (motor.value * scales[1])
-        ratio, lag = abs(value), float(np.degrees(np.angle(value)))
+    factor, ratio = abs(scales[0]), None
+    if motor is not None:
+        ratio = abs(fit.value * scales[0] / (motor.value * scales[1]))
     by_chain, gains, unfit = {}, {}, []
     part = samples[int(fit.start_s * rate) : int(np.ceil(fit.end_s * rate)) + 1]
     for chain in chains:
@@ -424,7 +399,6 @@ def measure_record(
         steady_s=steady,
         masked=fit.masked,
         ratio=ratio,
-        lag_deg=lag,
         by_chain=by_chain,
         gains=gains,
     )
@@ -446,7 +420,7 @@ def _fits(
     """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
     fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
-        fit = fit_line(samples[:, i], rate, band, mains_hz, sensors[i].full_scale, fits[0] if fits else None)
+        fit = fit_line(samples[:, i], rate, band, mains_hz, fits[0] if fits else None)
         fits.insert(0, fit if fit and fit.amplitude > 0 else None)
     return fits
 

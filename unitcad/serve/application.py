@@ -8,14 +8,13 @@ import hashlib
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, TypeVar
 
 import msgspec
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, RedirectResponse, Response, StreamingResponse
+from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from unitcad.errors import Refusal, UnitcadError
@@ -31,8 +30,6 @@ from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
 T = TypeVar("T", bound=msgspec.Struct)
-CAMPAIGN_S = 300.0
-"""Seconds that the records of a campaign may take."""
 FILE_TYPES = {
     ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
     ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
@@ -48,7 +45,7 @@ class Setting:
     """State of a server: the first text and its file's name, the folders of files, the files that texts may name.
 
     `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that
-    the page lists. `campaign`: a file that a room shows as a page of its own, and the module of that page.
+    the page lists.
     """
 
     text: str
@@ -60,7 +57,6 @@ class Setting:
     token: str
     port: int
     batch: Path | None = None
-    campaign: tuple[Path, str] | None = None
 
 
 def application(live: Live) -> RequestGuard:
@@ -95,7 +91,7 @@ class Live:
     @contextlib.asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
         """Warm the workers up at the start, end workers and jobs at the end."""
-        for what in () if self.setting.campaign else ANSWER_S:
+        for what in ANSWER_S:
             self.questions.pool(what)
         try:
             yield
@@ -109,11 +105,6 @@ class Live:
     async def page(self, request: Request) -> Response:
         """Answer with the page, with the cookie that loads it again."""
         setting = self.setting
-        if setting.campaign and "token" in request.query_params:
-            # Its page has no script that takes the token out of the address.
-            return self._keeping(RedirectResponse("/", 303))
-        if setting.campaign:
-            return await self._campaign(*setting.campaign)
         batch = None
         if setting.batch:
             try:
@@ -121,31 +112,10 @@ class Live:
             except (UnitcadError, OSError, RuntimeError) as error:  # RuntimeError: a loop of links
                 return PlainTextResponse(f"{error}\n", 422)
         html = live_page(setting.text, setting.name, str(setting.folder), setting.starts, batch)
-        return self._html(html)
-
-    def _html(self, html: str, status: int = 200) -> Response:
         headers = {"content-security-policy": HEADER_POLICY}
-        return self._keeping(Response(html, status, media_type="text/html; charset=utf-8", headers=headers))
-
-    def _keeping(self, response: Response) -> Response:
-        """Return a response with which the browser keeps the page's cookie."""
+        response = Response(html, media_type="text/html; charset=utf-8", headers=headers)
         response.set_cookie(self.cookie, self.keys.cookie, httponly=True, samesite="strict")
         return response
-
-    async def _campaign(self, path: Path, module: str) -> Response:
-        """Answer with the page of a campaign, measured again at each load."""
-        status = 422
-        async with self.questions.turns["estimate"]:
-            try:
-                content = await self.questions.call(
-                    "estimate", f"{module}:measured", str(path).encode(), seconds=CAMPAIGN_S
-                )
-                given = msgspec.json.decode(content)
-            except (WorkerEnded, NoWorker) as error:
-                given, status = {"refused": str(error)}, 500
-        if "page" in given:
-            return self._html(given["page"])
-        return self._html(import_module(module).refusal_page(path, given["refused"]), status)
 
     async def ask(self, request: Request) -> Response:
         """Answer a question about a text by the worker for it."""

@@ -19,7 +19,7 @@ def serve(
         str | None,
         typer.Argument(
             metavar="[SPEC]",
-            help=f"Spec, array or campaign file, template, or folder of results. Default: {default_template()}.",
+            help=f"Spec or array file, template, or folder of results. Default: {default_template()}.",
         ),
     ] = None,
     out: Annotated[

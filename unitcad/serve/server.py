@@ -17,7 +17,7 @@ from unitcad.files import read_text
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
-from unitcad.rooms import FileKind, expect_none_but, file_kinds
+from unitcad.rooms import expect_none_but
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, Setting, application
 from unitcad.serve.jobs import RESULTS
@@ -44,7 +44,7 @@ def serve(
 ) -> None:
     """Serve the live page of a spec on the loopback until it is interrupted; `ready` takes its address with the token.
 
-    `source` is a file of a spec, an array or a campaign, a template's name, a result's folder, or a batch's, whose rows
+    `source` is a file of a spec or an array, a template's name, a result's folder, or a batch's, whose rows
     open live; None: the default template. `port` 0: any that is free.
     Raises Refusal for a spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
@@ -59,10 +59,8 @@ def serve(
     text = read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
     folder = path.parent.resolve() if is_own(source) else Path.cwd()
-    kind = _page_kind(data)
-    if not kind and not compound_kind(data):
+    if not compound_kind(data):
         expect_none_but("spec", data, str(path), "spec", WrongArgument)
-    campaign = (path.resolve(), kind.page) if kind else None
     trusted = [_trusted_source(data, path, code)]
     plain = {name: each for name, each in every_template().items() if name not in custom_templates()}
     starts: dict[str, str | None] = {name: read_text(each) for name, each in plain.items()}
@@ -76,7 +74,7 @@ def serve(
         bound = listening.getsockname()[1]
         setting = Setting(
             text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
-            Trusted([source for source in trusted if source.named]), starts, token, bound, batch, campaign,
+            Trusted([source for source in trusted if source.named]), starts, token, bound, batch,
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
         live = Live(setting)
@@ -127,18 +125,12 @@ def _source(source: str | None) -> tuple[str | None, Path | None]:
 
 
 def _is_spec(path: Path) -> bool:
-    """Tell whether a file is a spec of a unit, of an array or of a campaign: by its keys, not by its values."""
+    """Tell whether a file is a spec of a unit or of an array: by its keys, not by its values."""
     try:
         data = read_toml(path)
     except UnitcadError:
         return False
-    return bool(compound_kind(data) or _page_kind(data)) or {"name", "layers"} <= set(data)
-
-
-def _page_kind(data: Mapping[str, Any]) -> FileKind | None:
-    """Return the kind of a file that a room shows as a page of its own, such as a campaign."""
-    kinds = [kind for kind in file_kinds() if kind.page and not kind.subject]
-    return next((kind for kind in kinds if all(key in data for key in kind.keys)), None)
+    return bool(compound_kind(data)) or {"name", "layers"} <= set(data)
 
 
 def is_own(source: str | None) -> bool:

@@ -40,7 +40,6 @@ def fit_line(
     rate: float,
     band: tuple[float, float] = BAND_HZ,
     mains_hz: float = 50.0,
-    full_scale: float | None = None,
     motor: LineFit | None = None,
 ) -> LineFit | None:
     """Return the line of samples x (n) at `rate` in Hz; None if the band has no line.
@@ -53,7 +52,7 @@ def fit_line(
     time = np.arange(len(x)) / rate
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
-    clipped = clip_level(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
+    clipped = clip_level(x, good)
     deviation = 1.4826 * np.median(np.abs(x[good]))
     known = good & (np.abs(x) < 6 * deviation) if deviation > 0 else good
 
@@ -235,17 +234,15 @@ LEAST_VALUES = 8
 """Different values below which a channel shows its converter's steps and no motion that a limit could cut off."""
 
 
-def clip_level(x: Floats, good: Bools, full_scale: tuple[float, float] | None = None) -> float:
+def clip_level(x: Floats, good: Bools) -> float:
     """Return the level at which samples about zero are cut off, over their true amplitude; infinite without a plateau.
 
     The true amplitude is that of a sine which is cut off as often; the level is 0 if that is half of the time or more.
-    One plateau is enough, and the lower of two counts. `full_scale` is the height of the positive and the negative
-    limit, if they are known.
+    One plateau is enough, and the lower of two counts.
     """
     part = float("inf")
     low, high = np.quantile(x[good], [0.05, 0.95])
-    fine = len(np.unique(x[good])) >= LEAST_VALUES
-    for sign, limit in zip((1.0, -1.0), full_scale or (None, None), strict=True):
+    for sign in (1.0, -1.0) if len(np.unique(x[good])) >= LEAST_VALUES else ():
         signed = sign * x
         peak = float(signed[good].max())
         below = NEAR * peak
@@ -256,8 +253,7 @@ def clip_level(x: Floats, good: Bools, full_scale: tuple[float, float] | None = 
         elif peak <= 0:
             continue
         near = good & (signed >= peak - below)
-        at_limit = limit is not None and peak >= 0.999 * limit
-        if at_limit or (fine and (near.sum() > CROWD * good.sum() or (peak > 0 and _repeats(signed[good], peak)))):
+        if near.sum() > CROWD * good.sum() or (peak > 0 and _repeats(signed[good], peak)):
             part = min(part, max(float(np.cos(np.pi * near.sum() / good.sum())) / (1 - NEAR), 0.0))
     return part
 
