@@ -524,52 +524,25 @@ def _solids(moulds: MouldSet, item: Placed | Extra, unit: bool) -> Iterator[Surf
 def _laid_out(
     moulds: MouldSet, solids: dict[_Key, list[Surface]]
 ) -> tuple[dict[_Key, list[Surface]], tuple[Name, ...]]:
-    """Lay tools out side by side in rows, on one plane, the pieces of a split one as they belong together; name them.
-
-    Tongues and filaments of several cavities are named by their number; pieces have their numbers written on them.
-    """
+    """Lay pieces out side by side in rows, on one plane, and name them; like ones of several cavities together."""
     plan = moulds.plan
-    places = {
-        piece.name: (split.tool, *divmod(i, split.columns))
-        for split in plan.splits
-        for i, piece in enumerate(split.pieces)
-    }
-    groups: dict[str, list[tuple[_Key, list[Surface]]]] = {}
-    for key, each in solids.items():
-        name = getattr(key[0], "name", "")
-        tool, row, column = places.get(name, (name, 0, 0))
-        groups.setdefault(tool, []).append((key, _shifted(each, (column * _GAP, -row * _GAP, 0.0))))
-    boxes = [_box([solid for _, each in group for solid in each])[1:] for group in groups.values()]
-    sizes = [tuple((high - low)[:2] + _GAP) for low, high in boxes]
+    points = [np.concatenate([solid.vertices for solid in each]) for each in solids.values()]
+    lows, highs = (np.array([pick(own, axis=0) for own in points]) for pick in (np.min, np.max))
+    sizes = [tuple(size) for size in (highs - lows)[:, :2] + _GAP]
     corners = layout(sizes, (1.25 * float(np.sqrt(np.prod(sizes, axis=1).sum())), 0.0))
     laid: dict[_Key, list[Surface]] = {}
     found: dict[str, list[tuple[float, float, float]]] = {}
-    numbers = []
-    for (name, group), (low, high), (x, y) in zip(groups.items(), boxes, corners, strict=True):
-        laid |= {key: _shifted(each, (x - low[0], -y - high[1], -low[2])) for key, each in group}
-        tool = plan.tool(name)
-        points, low, high = _box(laid[group[0][0]])
-        x, y, _ = (low + high) / 2
-        if len(group) > 1:  # at the left edge of its first piece
-            at = low[0], y, high[2]
-            for i, (key, _) in enumerate(group, 1):
-                _, low, high = _box(laid[key])
-                numbers.append(Name(str(i), (*((low + high) / 2)[:2].tolist(), float(high[2])), on=True))
-        else:  # near the front edge
-            off = np.hypot(points[:, 0] - x, points[:, 1] - 0.9 * low[1] - 0.1 * high[1]).round(1)
-            at = points[np.lexsort((-points[:, 2], off))[0]]
+    for (key, each), own, low, high, (x, y) in zip(solids.items(), points, lows, highs, corners, strict=True):
+        by = np.array((x - low[0], -y - high[1], -low[2]))
+        laid[key] = [replace(solid, vertices=solid.vertices + by) for solid in each]
+        # Its name is near the front edge.
+        middle, front = (low[0] + high[0]) / 2, 0.9 * low[1] + 0.1 * high[1]
+        off = np.hypot(own[:, 0] - middle, own[:, 1] - front).round(1)
+        at = own[np.lexsort((-own[:, 2], off))[0]] + by
+        name = getattr(key[0], "name", "")
+        tool = next(piece for piece in plan.pieces if piece.name == name)
         filament = "straight filament" if tool.step else "filament"
         called = {"tongue": "tongue", "filament": filament}.get(tool.kind, plan.called(name))
         found.setdefault(called, []).append((float(at[0]), float(at[1]), float(at[2])))
     names = (Name(f"{len(at)} {name}s" if len(at) > 1 else name, at[0]) for name, at in found.items())
-    return laid, (*numbers, *names)
-
-
-def _shifted(solids: list[Surface], by: tuple[float, float, float]) -> list[Surface]:
-    return [replace(solid, vertices=solid.vertices + by) for solid in solids]
-
-
-def _box(solids: list[Surface]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the points of solids, the lowest and the highest corner of their box."""
-    points = np.concatenate([solid.vertices for solid in solids])
-    return points, points.min(axis=0), points.max(axis=0)
+    return laid, tuple(names)
