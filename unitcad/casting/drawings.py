@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from unitcad.designs import layer_colour
 from unitcad.moulds.base import GRIP_WIDTH, outline, plate_top
-from unitcad.moulds.cup import window_section
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -123,15 +122,11 @@ def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
 
 @dataclass(frozen=True)
 class Prop:
-    """A pad of card on the plate, against the cup: its size in mm, and each one's shape in its place.
-
-    `tolerance_mm`: how far its thickness may be off: the tongue has as much room above and below in its windows.
-    """
+    """A pad of card on the plate, against the cup: its size in mm, and each one's shape in its place."""
 
     thickness_mm: float
     width_mm: float
     length_mm: float
-    tolerance_mm: float
     pads: tuple[Shape, ...]
 
 
@@ -145,10 +140,6 @@ def tongue_prop(moulds: MouldSet) -> Prop | None:
     lay, exit, top = moulds.plan.layout, moulds.dimensions.exit, plate_top(moulds.spec)
     if not exit or not moulds.plan.of_kind("tongue"):
         return None
-    room = []
-    for step in moulds.plan.steps:
-        _, low, high = window_section(moulds.spec, exit, step.rim)
-        room += [exit.low - low, *([high - exit.high] if high < step.rim else [])]
     width = float(math.floor((lay.plate[0] - lay.cup[0]) / ON_PLATE))
     pads, lengths = [], []
     for side in (1, -1):
@@ -157,4 +148,4 @@ def tongue_prop(moulds: MouldSet) -> Prop | None:
             y0, y1 = min(along) - GRIP_WIDTH / 2 - 1, max(along) + GRIP_WIDTH / 2 + 1
             pads.append(box(x0, x1, y0, y1, top, exit.low))
             lengths.append(y1 - y0)
-    return Prop(exit.low - top, width, max(lengths), min(room), tuple(pads))
+    return Prop(exit.low - top, width, max(lengths), tuple(pads))

@@ -80,7 +80,6 @@ class Mix:
     mix_g: float
     part_a_g: float
     part_b_g: float
-    net_error_pct: float
     mix_error_pct: float
     millilitres: float
     syringe_ml: float = 0.0
@@ -100,12 +99,8 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
     # The waste remains in the mixing cup; the rest in the syringe comes on top.
     total = max(net * (1 + casting.waste) + (HELD_BACK_ML * density if syringe else 0.0), casting.minimum_mix_g)
     share = ratio / (1 + ratio)
-    smaller = min(share, 1 - share)
-
-    def error(grams: float) -> float:
-        return 100 * casting.scale_resolution_g / 2 / (grams * smaller)
-
-    return Mix(net, total, total * share, total * (1 - share), error(net), error(total), total / density, syringe)
+    error = 100 * casting.scale_resolution_g / 2 / (total * min(share, 1 - share))
+    return Mix(net, total, total * share, total * (1 - share), error, total / density, syringe)
 
 
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
@@ -268,8 +263,7 @@ class Batch:
             mix.syringe_ml and ("to draw into the syringe, at least", mix.syringe_ml, "ml", held_back),
             ("part A", mix.part_a_g, "g", ratio),
             ("part B", mix.part_b_g, "g", ratio),
-            ("scale's error on a part, net", mix.net_error_pct, "%", digit),
-            ("scale's error on a part, mixed", mix.mix_error_pct, "%", digit),
+            ("scale's error on a part", mix.mix_error_pct, "%", digit),
             ("pot life in this room", self.pot_min, "min", by_temperature + source_text(silicone.pot_life_min)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),

@@ -347,22 +347,12 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         f"over the underside of the {below} and over the seam's ends"
     )
     if upper:
-        # The pins join the pieces of each cup, except if no unit is between a seam of the base and one of a cup.
-        x, y = plan.layout.plate
-        across = base.seams[0].across
-        middles = [cell.x if across == "x" else cell.y for cell in plan.layout.cells]
-        others = [seam.at for cup in cups for seam in cup.seams]
-        same = []
-        for seam in base.seams if plan.tool(base.tool).kind == "base" else ():
-            if any(not any(min(seam.at, at) < mid < max(seam.at, at) for mid in middles) for at in others):
-                off, end = (seam.at + x, "left end") if across == "x" else (y - seam.at, "back")
-                same.append(f"{number(off, 3)} mm from the base's {end}")
-        in_line = "The pins hold the pieces of each cup in line"
-        if same:
+        in_line, at = "The pins hold the pieces of each cup in line", {seam.at for cup in cups for seam in cup.seams}
+        if any(seam.at in at for seam in base.seams):
             in_line = (
-                f"If base and cup are cut at the same gap ({join_words(same)}), only dovetails and tape align them: "
-                "keep the base on one flat board, and before each pour lay the blade's edge over that seam on "
-                "the rim: no light may show under it"
+                "Where base and cup are cut at the same gap, only dovetails and tape align them: keep the base on one "
+                "flat board, and before each pour lay the blade's edge over that seam on the rim: no light may show "
+                "under it"
             )
         text += (
             f"; petroleum jelly rubbed into the underside of {join_words(upper)}, flush. The tape stays on until the "
