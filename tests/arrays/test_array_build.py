@@ -105,14 +105,13 @@ def test_the_bench_page_speaks_of_the_sheet(folder):
     page.unlink()
     content = json.loads(gzip.decompress(base64.b64decode(packed[1])))
     assert (content["casting"]["makes"], content["casting"]["last"]) == ("sheet", "Units in")
-    wanted = {f"steps/{name}.png" for name in ("pieces", "level", "pour", "strike", "filled", "peel", "units-in")}
+    wanted = {f"steps/{name}.png" for name in ("pieces", "pour", "strike", "filled", "peel", "units-in")}
     assert wanted <= set(content["pictures"])
 
 
 def test_a_blade_that_no_bed_takes_is_a_bar_of_metal():
-    array = load_array(
-        "hex-19", {"layout.rings": 3, "moulds.bed_x_mm": 100, "moulds.bed_y_mm": 100, "moulds.cavities": [1, 1]}
-    )
+    rows = {"layout.columns": 2, "layout.rows": 7, "moulds.bed_x_mm": 112, "moulds.bed_y_mm": 112}
+    array = load_array("forearm-pockets", {**rows, "moulds.cavities": [1, 1]})
     _, made = pockets_cast(array)
     assert [(item.made, "bar of metal" in item.note) for item in made.bill if item.item == "blade"] == [
         ("printed upside down", False),

@@ -59,11 +59,11 @@ REFUSED = [
     ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
     ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
     ("forearm-patch", {"moulds.bed_x_mm": 10}, "moulds.bed_x_mm", 56.4),
-    ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.7),
+    ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.74),
     ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 52.82),
     ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 210.3),
     ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 202.39),
-    ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", 263.395),
+    ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", 263.39),
 ]
 
 

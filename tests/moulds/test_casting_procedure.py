@@ -11,7 +11,7 @@ from faulty_sets import set_of
 from tests.sample_bodies import LEADLESS
 from unitcad.casting import figures, pouring, procedure_text
 from unitcad.casting import procedure as casting_procedure
-from unitcad.casting.figures import off_grid, unit_heights
+from unitcad.casting.figures import unit_heights
 from unitcad.casting.steps import number_steps
 from unitcad.catalogue import materials
 from unitcad.kernels.mesh import arrays, realise
@@ -80,17 +80,6 @@ def test_mix_covers_waste_and_least_batch():
     assert mix.mix_error_pct == pytest.approx(100 * 0.005 / mix.part_a_g)
 
 
-def test_weep_goes_with_the_cube_of_the_clearance():
-    one, two = (
-        set_of("encapsulating", f"moulds.window_clearance_mm={c}", "moulds.layer_mm=0.005") for c in (0.05, 0.1)
-    )
-    silicone = materials()["ecoflex-00-30"]
-    weep = [figures.weep_mm3(m, m.plan.steps[0], silicone) for m in (one, two)]
-    assert weep[1] / weep[0] == pytest.approx(8, rel=1e-9)
-    closed = set_of(LEADLESS)
-    assert figures.weep_mm3(closed, closed.plan.steps[0], silicone) == 0
-
-
 def test_cure_follows_the_room():
     assert figures.at_room(4.0, 23) == 4.0
     assert figures.at_room(4.0, 33) == 2.0
@@ -99,7 +88,7 @@ def test_cure_follows_the_room():
 @pytest.mark.parametrize("name", sorted(templates()))
 def test_every_figure_has_a_source(name):
     casting = procedure(name)
-    for figure in (*casting.walls, *(f for pour in casting.pours for f in pour.figures)):
+    for figure in (f for pour in casting.pours for f in pour.figures):
         known = "datasheet: |paper: |secondary: |computed: |assumed: |spec: |mix ratio, |half of "
         assert figure.source.startswith(tuple(known.split("|"))), figure
         assert math.isfinite(figure.value)
@@ -156,17 +145,6 @@ def test_bill_counts_pieces():
     assert len(csv) == len(casting.bill) + 1
 
 
-def test_edges_off_the_layer_grid():
-    """A height that is asked for stays where it is, and is listed."""
-    moulds = set_of("encapsulating", "moulds.slot_height_mm=0.5", "moulds.plate_mm=4.07")
-    edges = {(e.piece, e.edge): e for e in off_grid(moulds)}
-    assert edges["base", "seat"].height_mm == pytest.approx(6.07)
-    assert edges["base", "seat"].moved_mm == pytest.approx(-0.07)
-    assert edges["tongue", "thickness"].height_mm == pytest.approx(0.5)
-    assert ("base", "ledge") not in edges
-    assert off_grid(set_of("encapsulating", "moulds.layer_mm=0.005")) == []
-
-
 def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said():
     """Cavity 2.11 and two caps of 1.25 on layers of 0.2: 8.11 and 6.0 above the bed, rims of 3.36 and 4.61."""
     moulds = set_of("encapsulating")
@@ -201,13 +179,6 @@ def test_flats_of_the_printed_pieces_end_whole_layers():
         assert all(any(abs(h - a) < 2e-3 for a in asked) for h in off), (tool.name, off)
 
 
-@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
-@pytest.mark.parametrize("name", sorted(templates()))
-@pytest.mark.parametrize("more", [[], ["moulds.pour=injected"]], ids=["", "lids"])
-def test_no_tool_of_a_template_is_off_the_grid(name, printer, more):
-    assert off_grid(set_of(name, f"moulds.printer={printer}", *more)) == []
-
-
 @pytest.mark.parametrize("thickness", [1.83, 2.0, 2.65, 3.37])
 @pytest.mark.parametrize("wires", [False, True])
 @pytest.mark.parametrize("layer", [0.1, 0.15, 0.2])
@@ -221,8 +192,6 @@ def test_a_slot_on_the_grid_still_takes_what_leaves(thickness, wires, layer):
     assert exit.low <= low + 1e-9
     assert exit.high >= high - 1e-9
     assert exit.height >= (0.8 if wires else 0.4) - 1e-9
-    # A window's upper edge keeps the cup's wall first.
-    assert [edge for edge in off_grid(moulds) if edge.piece in ("base", "tongue")] == []
 
 
 def as_printed(moulds):
@@ -337,10 +306,6 @@ def test_walls_vary_by_what_the_ribs_leave():
     casting = procedure("encapsulating")
     assert casting.eccentricity.as_drawn_mm == pytest.approx(0.03 * math.sqrt(2))
     assert casting.eccentricity.at_worst_mm == pytest.approx(0.075 * math.sqrt(2))
-    assert casting.without_ribs.as_drawn_mm == pytest.approx(0.15 * math.sqrt(2))
-    walls = {figure.name: figure.value for figure in casting.walls}
-    assert walls["layer 1 wall, thinnest"] == pytest.approx(1.25 - 0.075 * math.sqrt(2))
-    assert walls["layer 2 wall, thickest"] == pytest.approx(1.25 + 0.15 * math.sqrt(2))
     record = json.loads(procedure_text.to_json(casting))
     assert record["eccentricity"] == {
         "ribs": 8,
@@ -380,7 +345,7 @@ ODD = ("diameter_mm=14.3217", "layers.0.wall_mm=1.23456", "moulds.plinth_clearan
 def test_figures_have_three_digits_at_most(source):
     """Neither 1.4e+04 cps nor 0.07323 %; what a name or a source says is not this project's figure."""
     casting = procedure(*source)
-    figures = [*casting.walls, *(figure for pour in casting.pours for figure in pour.figures)]
+    figures = [figure for pour in casting.pours for figure in pour.figures]
     text = procedure_text.to_markdown(casting)
     for name in (casting.label, casting.name, *(f.source for f in figures if "datasheet" in f.source)):
         text = text.replace(name, "")
@@ -405,15 +370,3 @@ def test_windows_that_resin_closes_are_cleared():
 def test_tools_in_resin_have_no_warning(name, tmp_path):
     done = build(load(name, ["moulds.printer=sla", "output.formats=['stl']"]), tmp_path, only=("moulds",))
     assert done.manifest["check"] == {"errors": 0, "warnings": 0, "findings": []}
-
-
-def test_areas_that_hold_are_information_with_their_ratio():
-    """Core, its top and the seat over the bore, in closed form; draft makes the bore's side longer by its cosine."""
-    core, top, seat = 2 * math.pi * 4.5 * 2.11, math.pi * 4.5**2, math.pi * (5.75**2 - 4.5**2)
-    values = {f.name: f.value for f in procedure("encapsulating").pours[0].figures}
-    expected = (core + top + seat) / (2 * math.pi * 5.75 * 3.36)
-    assert values["area on the base over area in the cup"] == pytest.approx(expected)
-    ring = (2 * math.pi * 4.5 * 2.0 + seat) / (2 * math.pi * 5.75 * 2.0)
-    values = {f.name: f.value for f in procedure("embedded").pours[0].figures}
-    assert values["area on the base over area in the cup"] == pytest.approx(ring)
-    assert not any("area on the base" in f.name for p in procedure("custom/strap-lugs").pours for f in p.figures)

@@ -19,7 +19,6 @@ from unitcad.arrays.array_file import array_of
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds, PatchPart, patch_bodies, patch_moulds, patch_parts
 from unitcad.casting.steps import duration
-from unitcad.checks import mould_checks
 from unitcad.errors import UnitcadError
 from unitcad.export import glb
 from unitcad.export.raster import Surface, draw
@@ -287,11 +286,6 @@ def _casting(folder: Path, casting: Mapping[str, Any]) -> Iterator[str]:
         f"<p>{escape(total)} from the printed pieces on, of which {escape(bench)} at the bench. "
         f'<a href="casting.md">Procedure</a>{also}, <a href="bom.csv">bill</a>.</p>'
     )
-    rows = [
-        (phase["name"], duration(phase["start_min"]), duration(phase["bench_min"]), duration(phase["wait_min"]))
-        for phase in casting["time_line"]
-    ]
-    yield _table(("what", "begins after", "at the bench", "then wait"), rows)
     grams = [(item["item"], f"{number(item['quantity'], 3)} g") for item in casting["bill"] if item["unit"] == "g"]
     yield _table(("silicone", "to mix"), grams)
 
@@ -324,25 +318,17 @@ def _places(array: Mapping[str, Any]) -> str:
 
 
 def _checks(manifest: ArrayManifest) -> str:
-    findings = manifest["mould_checks"]
-    if not findings:
-        return ""
-    passed = Counter(each["code"] for each in findings if each["ok"])
-    every = Counter(each["code"] for each in findings)
-    meaning = {code: check.demands for code, check in mould_checks().items()}
-    rows = [(code, meaning.get(code, ""), f"{passed[code]} of {count}") for code, count in sorted(every.items())]
-    table = _table(("code", "condition", "passed"), rows)
     broken = "".join(
         f"<li>{escape(each['code'])} {escape(each['where'])}: {each['value']:.3g} {escape(each['unit'])}, limit "
         f"{each['limit']:.3g}. {escape(each['advice'])}</li>"
-        for each in findings
+        for each in manifest["mould_checks"]
         if not each["ok"]
     )
     meshes = "".join(
         f"<li>{escape(each['path'])}: {escape(each['code'])} {escape(each['message'])}</li>"
         for each in manifest["check"]["findings"]
     )
-    return table + (f"<ul>{broken}{meshes}</ul>" if broken or meshes else "")
+    return f"<ul>{broken}{meshes}</ul>" if broken or meshes else ""
 
 
 def _files(manifest: ArrayManifest) -> str:

@@ -185,7 +185,6 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Level {base}",
         f"Put {base} in its final place, {lid} on it, dry. Lay a level on {lid}, along and across, and shim the "
         f"corners with paper. Within 5 degrees is good enough: so much the vents clear. Lift {lid} off.",
-        _picture(step, "level"),
         minutes=5.0,
         required_tools=("level", "paper"),
     )
@@ -395,6 +394,7 @@ def pocket_procedure(
     silicone = catalogue.materials(spec.materials)[step.material]
     batch = Batch(moulds, step, silicone, sheet_mm3, 1)
     cast = tuple(_units(array, units))
+    enough, level_tool = fall(moulds)
     prepared = (
         BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=5.0),
         *cleaning(moulds, [silicone]),
@@ -402,8 +402,8 @@ def pocket_procedure(
         # The sheet must not get thinner at one end by more than a dent.
         level(
             "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
-            f"and across, and shim its corners with paper. {fall(moulds)} Leave the tray there until "
-            "it is cured."
+            f"and across, and shim its corners with paper. {enough} Leave the tray there until it is cured.",
+            level_tool,
         ),
     )
     poured = (
@@ -441,7 +441,6 @@ def pocket_procedure(
         time_line=line,
         printing=_printing(moulds, printed_mm3, units),
         preparation=(*cast, *prepared),
-        off_grid=(),
         unit_heights=(),
         pours=(pour,),
         bonds=(),
@@ -449,8 +448,6 @@ def pocket_procedure(
         assembly=together,
         measure=tuple(_measure(array, grams, units)),
         eccentricity=None,
-        without_ribs=None,
-        walls=(),
         troubles=troubles(moulds),
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",

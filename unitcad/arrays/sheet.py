@@ -199,45 +199,38 @@ LONGEST = 1500.0
 
 
 def check_length(asked: AskedArray, points: Sequence[Point], outline: Box) -> None:
-    """Raise Refusal for a sheet that is too long: for the key with most of its length, with the value that fits."""
+    """Raise Refusal for a sheet that is too long: for the key with most of its length."""
     for axis, ways in enumerate(zip(*((point.x, point.y) for point in points), strict=True)):
-        length = outline[axis + 2] - outline[axis]
-        over, span = length - LONGEST, max(ways) - min(ways)
-        if over <= 2 / 1024:
+        length, span = outline[axis + 2] - outline[axis], max(ways) - min(ways)
+        if length <= LONGEST + 2 / 1024:
             continue
-        limit = f"the sheet would be {length:.5g} mm long along {'xy'[axis]}; it is at most {LONGEST:g} mm"
-        field, value = max(_beside(asked, axis), key=lambda each: each[1])
+        table = asked.sheet
+        beside = [("sheet.margin_mm", table.margin_mm)]
+        if table.strap_slot_mm and axis == 0:
+            beside += [("sheet.strap_web_mm", table.strap_web_mm), ("sheet.strap_slot_mm.0", table.strap_slot_mm[0])]
+        field, value = max(beside, key=lambda each: each[1])
         if span >= 2 * value:
-            field, value, more = _of_layout(asked, axis, span)
-        else:
-            more = 2.0
-        nearest = down(value - over / more) if more else 0.0
-        raise Refusal(field, value, limit, nearest if nearest > 0 else None)
+            field, value = _of_layout(asked, axis, span)
+        limit = f"the sheet would be {length:.5g} mm long along {'xy'[axis]}; it is at most {LONGEST:g} mm"
+        raise Refusal(field, value, limit)
 
 
-def _beside(asked: AskedArray, axis: int) -> list[tuple[str, float]]:
-    """Return the sheet's ends along an axis: field and value, mm."""
-    sheet = asked.sheet
-    found = [("sheet.margin_mm", sheet.margin_mm)]
-    if sheet.strap_slot_mm and axis == 0:
-        found += [("sheet.strap_web_mm", sheet.strap_web_mm), ("sheet.strap_slot_mm.0", sheet.strap_slot_mm[0])]
-    return found
-
-
-def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float, float]:
-    """Return a layout's field, its value, and how much longer (mm) a unit more of it makes the span of the places."""
+def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float]:
+    """Return the field of a layout that makes the `span` of its places along an axis, and its value."""
     layout = asked.layout
     if layout["kind"] == "list":
-        return "layout.points_mm", round(span, 3), 0.0
+        return "layout.points_mm", round(span, 3)
     if layout["kind"] == "ring":
-        if axis == 0:
-            return "limb.radius_mm", asked.limb.radius_mm or 0.0, 2 * math.pi * (1 - 1 / layout["count"])
-        pitch, field = layout["band_pitch_mm"], "layout.band_pitch_mm"
-    else:
-        pitch, field = layout["pitch_mm"], "layout.pitch_mm"
-        if not isinstance(pitch, int | float):
-            pitch, field = pitch[axis], f"{field}.{axis}"
-    return field, pitch, span / pitch
+        return (
+            ("layout.band_pitch_mm", layout["band_pitch_mm"])
+            if axis
+            else (
+                "limb.radius_mm",
+                asked.limb.radius_mm or 0.0,
+            )
+        )
+    pitch = layout["pitch_mm"]
+    return ("layout.pitch_mm", pitch) if isinstance(pitch, int | float) else (f"layout.pitch_mm.{axis}", pitch[axis])
 
 
 LENGTH = 1000.0

@@ -166,8 +166,6 @@ def list_consumables(
         named.discard("adhesive tape")  # its strips are on the list
     for tool in sorted(named, key=[*REQUIRED_TOOLS].index):
         unit, made, note = REQUIRED_TOOLS[tool]
-        if tool == "level" and any("spirit level" in step.text for step in steps):
-            note = "a spirit level of 0.5 mm/m"
         yield Item(tool, 1, unit, made, note)
     if prop := tongue_prop(moulds):
         note = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"

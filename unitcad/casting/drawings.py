@@ -1,23 +1,19 @@
-"""Additions to the pieces in pictures of the procedure: arrows, tape, grease, paper, card, screwdrivers."""
+"""Additions to the pieces in pictures of the procedure: arrows, tape, grease, card, screwdrivers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from unitcad.designs import layer_colour
-from unitcad.designs.design import Cell
-from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH, outline, plate_top
-from unitcad.moulds.cup import skirt_end, window_section
+from unitcad.moulds.base import GRIP_WIDTH, outline, plate_top
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, rotated, turned, union
 
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
-CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 0.16), (0.10, 0.10, 0.12)
-TAB = (0.93, 0.90, 0.78)
+CARD, GREASE = (0.45, 0.72, 0.38), (0.98, 0.72, 0.16)
 CLEAR = 5.0
 """Between a piece that is lifted off and its place, mm."""
 Offset = tuple[float, float, float]
@@ -61,36 +57,14 @@ def bands(x: float, y: float, low: float, high: float) -> tuple[Extra, ...]:
     return Extra(band(x - 2), BAND), Extra(band(2 - x), BAND)
 
 
-def tails(moulds: MouldSet) -> list[tuple[Cell, int]]:
-    """Return every way out of a cell for a tail or a tongue: the cell, and the side."""
-    return [(cell, side) for cell in moulds.plan.layout.cells for side in cell.sides]
-
-
 def on_tongues(moulds: MouldSet, length: float, colour: tuple[float, float, float]) -> tuple[Extra, ...]:
-    """Draw grease, or a pen's mark, on `length` mm of every tongue next to the cup's wall."""
-    wall = moulds.plan.layout.cup[0]
-    return _sleeves(moulds, 0.15, colour, [(cell.y, s * wall, s * (wall + length)) for cell, s in tails(moulds)])
-
-
-def tabs(moulds: MouldSet, out: float = 0.0) -> tuple[Extra, ...]:
-    """Draw the folded tape on every tongue that is cut, pulled out by `out` mm; none on printed ones."""
-    lay = moulds.plan.layout
-    if grip_of(moulds) == "grip":
-        return ()
-    near = max(lay.cup[0] - abs(cell.x) for cell in lay.cells) + GRIP_GAP + out
-    far = near + GRIP_LENGTH + 0.5
-    return _sleeves(moulds, 0.5, TAB, [(cell.y, cell.x + s * near, cell.x + s * far) for cell, s in tails(moulds)])
-
-
-def _sleeves(
-    moulds: MouldSet, thick: float, colour: tuple[float, float, float], places: Sequence[tuple[float, float, float]]
-) -> tuple[Extra, ...]:
-    """Draw a coat round tongues, a film in height and `thick` in width: their y, and both ends along x."""
-    exit = moulds.dimensions.exit
+    """Draw grease on `length` mm of every tongue next to the cup's wall."""
+    lay, exit = moulds.plan.layout, moulds.dimensions.exit
     if not exit:
         return ()
-    half, low, high = exit.width / 2 + thick, exit.low - 0.15, exit.high + 0.15
-    return tuple(Extra(box(min(x0, x1), max(x0, x1), y - half, y + half, low, high), colour) for y, x0, x1 in places)
+    half, low, high = exit.width / 2 + 0.15, exit.low - 0.15, exit.high + 0.15
+    ends = [(cell.y, *sorted((s * lay.cup[0], s * (lay.cup[0] + length)))) for cell in lay.cells for s in cell.sides]
+    return tuple(Extra(box(x0, x1, y - half, y + half, low, high), colour) for y, x0, x1 in ends)
 
 
 def grease_on_rim(moulds: MouldSet, step: Step) -> Extra:
@@ -99,14 +73,6 @@ def grease_on_rim(moulds: MouldSet, step: Step) -> Extra:
     outer, inner = (outline((x - by, y - by), MARK) for by in (0.4, 1.2))
     hole = Extrude(inner, step.rim - 1, step.rim + 1)
     return Extra(cut(Extrude(outer, step.rim, step.rim + 0.3), (hole,)), GREASE)
-
-
-def paper_in_slit(moulds: MouldSet) -> tuple[Extra, ...]:
-    """Draw a strip of paper in the slit between a cup's skirt and the plate, on two sides."""
-    low, high, (x, y) = plate_top(moulds.spec), skirt_end(moulds.spec), moulds.plan.layout.cup
-    front = CORNER_RADIUS - y
-    strips = box(x - 1, x + 9, front, front + 6, low, high), box(-x - 9, 1 - x, front, front + 6, low, high)
-    return tuple(Extra(strip, PAPER) for strip in strips)
 
 
 def screwdrivers(lifted: float, edge: float, low: float) -> tuple[Extra, ...]:
@@ -123,19 +89,6 @@ def screwdrivers(lifted: float, edge: float, low: float) -> tuple[Extra, ...]:
             Extra(turned(union((blade, handle)), "z", 1 - side), TOOL),
             arrow(DOWN, side * (edge + 9), 0.0, low + 9, 9.0),
         )
-    )
-
-
-def spirit_level(half: float, z: float, plate: tuple[float, float], bottom: float) -> tuple[Extra, ...]:
-    """Draw a spirit level along x on a surface at `z` that is `half` wide to either side.
-
-    Paper is under a corner of the base, whose half sizes are `plate` and whose underside is at `bottom`.
-    """
-    long, (x, y) = min(1.5 * half, 30.0), plate
-    return (
-        Extra(box(-long, long, -4.0, 4.0, z, z + 4.5), TOOL),
-        Extra(box(-4.0, 4.0, -2.0, 2.0, z + 4.0, z + 5.0), (0.75, 0.93, 0.35)),
-        Extra(box(-x - 6, -x + 5, -y - 3, -y + 6, bottom - 0.8, bottom), PAPER),
     )
 
 
@@ -169,15 +122,11 @@ def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
 
 @dataclass(frozen=True)
 class Prop:
-    """A pad of card on the plate, against the cup: its size in mm, and each one's shape in its place.
-
-    `tolerance_mm`: how far its thickness may be off: the tongue has as much room above and below in its windows.
-    """
+    """A pad of card on the plate, against the cup: its size in mm, and each one's shape in its place."""
 
     thickness_mm: float
     width_mm: float
     length_mm: float
-    tolerance_mm: float
     pads: tuple[Shape, ...]
 
 
@@ -191,10 +140,6 @@ def tongue_prop(moulds: MouldSet) -> Prop | None:
     lay, exit, top = moulds.plan.layout, moulds.dimensions.exit, plate_top(moulds.spec)
     if not exit or not moulds.plan.of_kind("tongue"):
         return None
-    room = []
-    for step in moulds.plan.steps:
-        _, low, high = window_section(moulds.spec, exit, step.rim)
-        room += [exit.low - low, *([high - exit.high] if high < step.rim else [])]
     width = float(math.floor((lay.plate[0] - lay.cup[0]) / ON_PLATE))
     pads, lengths = [], []
     for side in (1, -1):
@@ -203,4 +148,4 @@ def tongue_prop(moulds: MouldSet) -> Prop | None:
             y0, y1 = min(along) - GRIP_WIDTH / 2 - 1, max(along) + GRIP_WIDTH / 2 + 1
             pads.append(box(x0, x1, y0, y1, top, exit.low))
             lengths.append(y1 - y0)
-    return Prop(exit.low - top, width, max(lengths), min(room), tuple(pads))
+    return Prop(exit.low - top, width, max(lengths), tuple(pads))

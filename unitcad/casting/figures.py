@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from itertools import pairwise, product
-
-import numpy as np
+from functools import cached_property
 
 from unitcad.catalogue import Material, Value
-from unitcad.designs.dimensions import Outline, growth
-from unitcad.designs.limits import filament_groove, leaf_mm
-from unitcad.moulds.base import plate_bottom, pry_floor
-from unitcad.moulds.cup import Rib, ribs, window_section
-from unitcad.moulds.layout import groove_depth_of
-from unitcad.moulds.lid import skirt_end
+from unitcad.designs.dimensions import growth
+from unitcad.moulds.cup import ribs
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import exact_volume
@@ -71,7 +64,6 @@ def source_text(value: Value) -> str:
     return f"{value.status}: {value.source}"
 
 
-HELD = "area on the base over area in the cup"
 FOAMS = "assumed: 4 x the mix, it foams up"
 SYRINGES_ML = 5.0, 10.0, 20.0, 30.0, 60.0, 100.0
 """The sizes that syringes are sold in, ml; larger mixes take more than one filling."""
@@ -88,7 +80,6 @@ class Mix:
     mix_g: float
     part_a_g: float
     part_b_g: float
-    net_error_pct: float
     mix_error_pct: float
     millilitres: float
     syringe_ml: float = 0.0
@@ -108,12 +99,8 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
     # The waste remains in the mixing cup; the rest in the syringe comes on top.
     total = max(net * (1 + casting.waste) + (HELD_BACK_ML * density if syringe else 0.0), casting.minimum_mix_g)
     share = ratio / (1 + ratio)
-    smaller = min(share, 1 - share)
-
-    def error(grams: float) -> float:
-        return 100 * casting.scale_resolution_g / 2 / (grams * smaller)
-
-    return Mix(net, total, total * share, total * (1 - share), error(net), error(total), total / density, syringe)
+    error = 100 * casting.scale_resolution_g / 2 / (total * min(share, 1 - share))
+    return Mix(net, total, total * share, total * (1 - share), error, total / density, syringe)
 
 
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
@@ -136,25 +123,6 @@ def at_room(value: float, room_c: float) -> float:
     return value * 2 ** ((DATASHEET_C - room_c) / DOUBLING_K)
 
 
-def weep_mm3(moulds: MouldSet, step: Step, material: Material) -> float:
-    """Return the silicone that flows out past the tongues of one cell during the whole pot life without grease, mm3.
-
-    Plane Poiseuille flow through the gaps round the tongue, each gap^3 width pressure / (12 viscosity length).
-    """
-    spec, dims = moulds.spec, moulds.plan.dimensions
-    if not dims.exit:
-        return 0.0
-    half, low, high = window_section(spec, dims.exit, step.rim)
-    over, under, beside = high - dims.exit.high, dims.exit.low - low, half - dims.exit.width / 2
-    gaps = ((over**3 + under**3) * dims.exit.width + 2 * beside**3 * dims.exit.height) / 1000**4
-    length = window_length(moulds, step) / 1000
-    head = max(step.rim - (dims.exit.low + dims.exit.high) / 2, 0.0) / 1000
-    pressure = 1000 * float(material.density_g_cm3) * GRAVITY * head
-    flow = gaps * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
-    seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
-    return len(dims.sides) * flow * seconds * 1e9
-
-
 def print_min(spec: Spec, solid_mm3: float, tallest_mm: float) -> float:
     """Return roughly how long the pieces print, min: by volume in filament, by the tallest piece's layers in resin."""
     layer = spec.moulds.layer_mm
@@ -167,35 +135,6 @@ def window_length(moulds: MouldSet, step: Step) -> float:
     """Return the length of a tongue inside the wall of a pour's cup, mm."""
     lay = moulds.plan.layout
     return lay.cup[0] - max(abs(cell.x) for cell in lay.cells) - moulds.plan.dimensions.radii[step.index - 1]
-
-
-def holding_ratio(moulds: MouldSet, step: Step) -> float:
-    """Return the area that silicone touches on the base over that in the bore of a pour's cup; 0 if no core is drawn.
-
-    Both are counted as the layer's outline drawn by `Dimensions`: the core's side and top under a cap, and the seat.
-    """
-    dims, plan = moulds.plan.dimensions, moulds.plan
-    if not plan.concentric:
-        return 0.0
-
-    def side(outline: Outline) -> float:
-        pairs = pairwise(outline)
-        return sum(math.pi * (r0 + r1) * math.hypot(r1 - r0, z1 - z0) for (r0, z0), (r1, z1) in pairs)
-
-    core, bore = dims.core_outline, dims.outside(step.index - 1)
-    top = core[-1][0] ** 2 if dims.core_height < step.rim else 0.0
-    held = side(core) + math.pi * (top + bore[0][0] ** 2 - core[0][0] ** 2)
-    return held / side(bore)
-
-
-def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float]:
-    """Return the thinnest and thickest wall of a layer (from 0) whose cups are up to `off_axis_mm` off the axis, mm.
-
-    Layer 1 is between the core and one cup position, each further layer between two.
-    """
-    off = off_axis_mm * (1 if layer == 0 else 2)
-    wall = spec.layers[layer].wall_mm
-    return max(wall - off, 0.0), wall + off
 
 
 @dataclass(frozen=True)
@@ -315,10 +254,6 @@ class Batch:
         stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic"
         ratio = f"mix ratio, {source_text(silicone.mix_ratio)}"
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
-        weep = 100 * weep_mm3(self.moulds, step, silicone) / self.volume_mm3
-        pressure = "; the syringe's pressure comes on top" if step.lid else ""
-        held = holding_ratio(self.moulds, step)
-        flow = f"computed: flow in the clearance under the pour's own weight{pressure}"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
             channels and ("sprue and vents", self.channels_mm3, "mm3", "computed: as drawn"),
@@ -328,8 +263,7 @@ class Batch:
             mix.syringe_ml and ("to draw into the syringe, at least", mix.syringe_ml, "ml", held_back),
             ("part A", mix.part_a_g, "g", ratio),
             ("part B", mix.part_b_g, "g", ratio),
-            ("scale's error on a part, net", mix.net_error_pct, "%", digit),
-            ("scale's error on a part, mixed", mix.mix_error_pct, "%", digit),
+            ("scale's error on a part", mix.mix_error_pct, "%", digit),
             ("pot life in this room", self.pot_min, "min", by_temperature + source_text(silicone.pot_life_min)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),
@@ -340,43 +274,8 @@ class Batch:
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
             ("cure in this room", self.cure_h, "h", by_temperature + source_text(silicone.cure_h)),
-            weep and ("weep by the windows, no grease", weep, "% of a layer", flow),
-            held and (HELD, held, "", "computed: adhesion is not measured"),
         )
         return tuple(Figure(*row) for row in rows if isinstance(row, tuple))
-
-
-def walls(moulds: MouldSet) -> tuple[Figure, ...]:
-    """Return how far the cups are off the core's axis, and the resulting walls."""
-    spec, made, free = moulds.spec, eccentricity(moulds), eccentricity(moulds, with_ribs=False)
-    lengths, cups = (
-        spec.moulds,
-        [(free, "without ribs", f"clearance of {number(spec.moulds.plinth_clearance_mm, 3)} mm a side x sqrt 2")],
-    )
-    if made.ribs:
-        pressed = "pushed back on leaves" if leaf_mm(printer_of(spec)) else "crushed"
-        depth = f"{pressed} by {number(lengths.rib_interference_mm, 3)} mm"
-        how = f"{made.ribs} ribs {depth}, each up to {UNEVEN:.0%} stronger or weaker (assumed)"
-        cups.append((made, "with ribs", how))
-    times = ", twice beyond Layer 1" if len(spec.layers) > 1 else ""
-    source = f"computed: cups up to {number(made.at_worst_mm, 2)} mm off the axis{times}"
-    worst = f"if the gap is printed {number(made.off_mm, 3)} mm off"
-    return (
-        *(
-            Figure(
-                f"cups off the core's axis, {what}, at most",
-                cup.as_drawn_mm,
-                "mm",
-                f"computed: {how}; {number(cup.at_worst_mm, 2)} {worst}",
-            )
-            for cup, what, how in cups
-        ),
-        *(
-            Figure(f"layer {i + 1} wall, {extreme}", wall, "mm", source)
-            for i in range(len(spec.layers))
-            for extreme, wall in zip(("thinnest", "thickest"), wall_range(spec, i, made.at_worst_mm), strict=True)
-        ),
-    )
 
 
 UNEVEN = 0.3
@@ -399,54 +298,22 @@ class Eccentricity:
     off_mm: float
 
 
-def eccentricity(moulds: MouldSet, *, with_ribs: bool = True) -> Eccentricity:
-    """Return the eccentricity of a set's cups as they are, or as they would be without ribs."""
-    lengths, lay = moulds.spec.moulds, moulds.plan.layout
+def eccentricity(moulds: MouldSet) -> Eccentricity:
+    """Return the eccentricity of a set's cups, on ribs or without."""
+    lengths = moulds.spec.moulds
     clearance, off, depth = lengths.plinth_clearance_mm, lengths.xy_play_mm, lengths.rib_interference_mm
-    standing = ribs(moulds.spec, lay) if with_ribs else ()
+    standing = ribs(moulds.spec, moulds.plan.layout)
     if not standing:
         return Eccentricity(0, math.sqrt(2) * clearance, math.sqrt(2) * (clearance + off), off)
-    cells = tuple((cell.x, cell.y) for cell in lay.cells)
-    # A gap can't be narrower than nothing; one wider than the ribs reach leaves the rest as play.
-    tight = depth + min(off, clearance)
+    # A gap can't be narrower than nothing; one wider than the ribs reach leaves the rest as play. Of opposite ribs one
+    # is stronger by UNEVEN and the other weaker, along x and along y.
+    tight = math.sqrt(2) * UNEVEN * (depth + min(off, clearance))
     loose = math.sqrt(2) * max(off - depth, 0.0)
-    share = shift_per_depth(standing, cells)
-    return Eccentricity(len(standing), share * depth, max(share * tight, loose), off)
-
-
-@lru_cache(maxsize=16)
-def shift_per_depth(standing: tuple[Rib, ...], cells: tuple[tuple[float, float], ...]) -> float:
-    """Return the greatest shift of a cell's bore, over the depth of the ribs, for every choice of their strengths."""
-    outward = -np.array([rib.inwards for rib in standing], dtype=float)
-    at = np.array([(rib.x, rib.y) for rib in standing])
-    # Change of each rib's depth by a shift (x, y) and a small turn of the cup, along its normal.
-    rows = np.column_stack([outward, at[:, 0] * outward[:, 1] - at[:, 1] * outward[:, 0]])
-    strengths = np.array(list(product((1 - UNEVEN, 1 + UNEVEN), repeat=len(standing))))
-    weighted = rows * strengths[:, :, None]
-    # Each rib pushes the cup outwards by its depth; moved out by u it is crushed by that much less.
-    moved = np.linalg.solve(np.swapaxes(weighted, 1, 2) @ rows, weighted.sum(axis=1)[:, :, None])
-    x, y, turn = np.moveaxis(moved, 1, 0)
-    cx, cy = np.array(cells).T
-    return float(np.hypot(x - turn * cy, y + turn * cx).max())
+    return Eccentricity(len(standing), math.sqrt(2) * UNEVEN * depth, max(tight, loose), off)
 
 
 NEAR = 0.02
 """Share of a layer within which a height counts as on the grid."""
-
-
-@dataclass(frozen=True)
-class OffGrid:
-    """An edge that no layer ends at: its height above the bed as printed, and the nearest layer's, mm."""
-
-    piece: str
-    edge: str
-    height_mm: float
-    nearest_mm: float
-
-    @property
-    def moved_mm(self) -> float:
-        """How far the slicer moves it."""
-        return self.nearest_mm - self.height_mm
 
 
 @dataclass(frozen=True)
@@ -456,40 +323,6 @@ class UnitHeight:
     what: str
     asked_mm: float
     printed_mm: float
-
-
-def off_grid(moulds: MouldSet) -> list[OffGrid]:
-    """Return the tooling's own edges that are off the grid.
-
-    Cups are printed upside down: heights count from their rims.
-    """
-    spec, dims, plan, (bottom, top) = moulds.spec, moulds.plan.dimensions, moulds.plan, moulds.plate
-    layer, exit = spec.moulds.layer_mm, dims.exit
-    edges = [
-        ("base", "plate", top - bottom),
-        ("base", "seat", -bottom),
-        ("base", "pry slots' floor", pry_floor(spec) - plate_bottom(spec)),
-    ]
-    if plan.of_kind("filament"):
-        edges.append(("base", "filament groove's roof", filament_groove(spec)))
-    if exit:
-        edges += [("base", "ledge", exit.low - bottom), ("tongue", "thickness", exit.height)]
-    for step, rim in zip(plan.steps, dims.heights, strict=True):
-        if step.groove:
-            edges.append((step.cup, "groove's floor", groove_depth_of(spec, rim)))
-        if exit:
-            _, low, high = window_section(spec, exit, rim)
-            edges.append((step.cup, "window's lower edge", rim - low))
-            if high < rim:
-                edges.append((step.cup, "window's upper edge", rim - high))
-        if step.lid and plan.concentric:
-            edges.append((step.lid, "skirt's edge", step.top - skirt_end(spec, dims, step.index - 1)))
-            edges.append((step.lid, "underside", step.top - rim))
-    return [
-        OffGrid(piece, edge, round(height, 4), round(near, 4))
-        for piece, edge, height in edges
-        if abs(height - (near := _whole(height, layer))) > NEAR * layer
-    ]
 
 
 OVER_ALL = "height over all"

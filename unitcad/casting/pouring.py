@@ -24,7 +24,6 @@ from unitcad.casting.figures import (
     Batch,
     at_room,
     eccentricity,
-    holding_ratio,
     pouring_min,
     unit_heights,
     window_length,
@@ -271,8 +270,6 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
 def recovery(moulds: MouldSet, layer: int) -> str:
     """Say where a layer stays when its cup is lifted, and what to do if it does not."""
     back = "from the skin's side" if layer == len(moulds.plan.steps) else "and put it back"
-    if 0 < holding_ratio(moulds, moulds.plan.steps[layer - 1]) < 1:
-        return f"Layer {layer} may come off in the cup, which holds more of it: then push it out {back}."
     return f"Layer {layer} should stay on the {holds(moulds)}: if it comes off in the cup, push it out {back}."
 
 
@@ -609,13 +606,10 @@ def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
     )
 
 
-def measurements(
-    moulds: MouldSet, masses_g: Sequence[float], skin_g: float, slot_height: float | None
-) -> Iterator[str]:
+def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> Iterator[str]:
     """Name the measures of the first part, and their expected values.
 
-    `masses_g`: of each layer of one unit, trimmed; `skin_g`: of its skin. `slot_height`: of the slot as the slicer
-    makes the tongue (mm), None if it is the drawn one.
+    `masses_g`: of each layer of one unit, trimmed; `skin_g`: of its skin.
     """
     spec, dims, off, exit = moulds.spec, moulds.dimensions, eccentricity(moulds), moulds.dimensions.exit
     layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
@@ -636,8 +630,7 @@ def measurements(
         yield moulds.across
     if exit:
         opening = "notch" if exit.high >= dims.heights[0] else "slot"
-        printed = f" ({shown(slot_height, 2)} if the tongue was printed {layers})" if slot_height else ""
-        size = f"{shown(exit.width, 2)} wide, {shown(exit.height, 2)} high{printed}"
+        size = f"{shown(exit.width, 2)} wide, {shown(exit.height, 2)} high"
         yield f"The {opening}: {size}, open all the way."
     weights = " + ".join(shown(each) for each in masses_g) + (f" = {shown(sum(masses_g))}" if len(masses_g) > 1 else "")
     low = "" if spec.moulds.pour == "injected" else " or a low strike"

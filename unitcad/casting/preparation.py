@@ -189,7 +189,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             f"{number(dims.exit.width, 3)} mm from film or steel {number(dims.exit.height, 3)} mm thick, without burr, "
             f"one end hollow to the ledge's radius of {number(dims.ledge_radius, 3)} mm. Fold tape over the other "
             f"end's last {number(GRIP_LENGTH, 2)} mm: you pull by this tab.",
-            picture_path("cut-tongue"),
+            picture_path("pieces"),
             minutes=5.0 * len(cut),
             required_tools=("flat pliers", "adhesive tape"),
         )
@@ -237,18 +237,19 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             required_tools=("sharp knife",),
         )
     cup = spaced(level_on(moulds).cup)
-    enough = fall(moulds)
+    enough, tool = fall(moulds)
     if lengths.pour == "injected":
-        enough = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents."
+        enough, tool = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents.", "level"
     yield level(
         f"Put the base in its final place, {cup} on it. Lay a level on the rim, along and across, and shim the base's "
-        f"corners with paper. {enough} Take {cup} off."
+        f"corners with paper. {enough} Take {cup} off.",
+        tool,
     )
 
 
-def level(text: str) -> BenchStep:
+def level(text: str, tool: str) -> BenchStep:
     """Say how level the mould must be, and how to see it."""
-    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, required_tools=("level", "paper"))
+    return BenchStep("Level the bench", text, minutes=5.0, required_tools=(tool, "paper"))
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
@@ -278,7 +279,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
             "Clear the windows",
             f"Clear the windows of {join_words(spaced(step.cup) for step in steps)}, {height} mm high, of resin: rinse "
             "each with a syringe of isopropanol and push the tongue through until it slides freely.",
-            picture_path("clear-windows"),
+            picture_path("pieces"),
             minutes=5.0 * len(steps),
             required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
         )
@@ -304,16 +305,17 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     )
 
 
-def fall(moulds: MouldSet) -> str:
-    """Say which level is good enough for an open pour, and what error remains."""
+def fall(moulds: MouldSet) -> tuple[str, str]:
+    """Say which level is good enough for an open pour, and what error remains; return the level among the tools too."""
     what, wide = moulds.poured_across
     left = {name: wide * math.tan(math.radians(tilt)) for name, tilt in GOOD_DEG.items()}
     name = next((name for name, error in left.items() if error <= DENT), list(left)[-1])
-    turned = ", turned end for end," if name != "a phone" else ""
-    return (
+    turned, tool = (", turned end for end,", "spirit level") if name != "a phone" else ("", "level")
+    said = (
         f"{name.capitalize()}{turned} is good enough: {number(GOOD_DEG[name], 2)} degrees leave "
         f"{number(left[name], 1)} mm across the {what} of {number(wide, 3)} mm."
     )
+    return said, tool
 
 
 def in_resin(moulds: MouldSet) -> bool:
@@ -344,22 +346,12 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         f"over the underside of the {below} and over the seam's ends"
     )
     if upper:
-        # The pins join the pieces of each cup, except if no unit is between a seam of the base and one of a cup.
-        x, y = plan.layout.plate
-        across = base.seams[0].across
-        middles = [cell.x if across == "x" else cell.y for cell in plan.layout.cells]
-        others = [seam.at for cup in cups for seam in cup.seams]
-        same = []
-        for seam in base.seams if plan.tool(base.tool).kind == "base" else ():
-            if any(not any(min(seam.at, at) < mid < max(seam.at, at) for mid in middles) for at in others):
-                off, end = (seam.at + x, "left end") if across == "x" else (y - seam.at, "back")
-                same.append(f"{number(off, 3)} mm from the base's {end}")
-        in_line = "The pins hold the pieces of each cup in line"
-        if same:
+        in_line, at = "The pins hold the pieces of each cup in line", {seam.at for cup in cups for seam in cup.seams}
+        if any(seam.at in at for seam in base.seams):
             in_line = (
-                f"If base and cup are cut at the same gap ({join_words(same)}), only dovetails and tape align them: "
-                "keep the base on one flat board, and before each pour lay the blade's edge over that seam on "
-                "the rim: no light may show under it"
+                "Where base and cup are cut at the same gap, only dovetails and tape align them: keep the base on one "
+                "flat board, and before each pour lay the blade's edge over that seam on the rim: no light may show "
+                "under it"
             )
         text += (
             f"; petroleum jelly rubbed into the underside of {join_words(upper)}, flush. The tape stays on until the "
@@ -368,7 +360,7 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
     yield BenchStep(
         "Join the pieces",
         f"{text}. Trim the fin of {play} mm that silicone makes in a seam with the flash.",
-        picture_path("join"),
+        picture_path("pieces"),
         minutes=3.0 * sum(len(split.pieces) - 1 for split in plan.splits),
         required_tools=("wide adhesive tape", *["petroleum jelly"] * bool(upper)),
     )

@@ -13,12 +13,9 @@ from unitcad.casting.figures import (
     Batch,
     Eccentricity,
     Figure,
-    OffGrid,
     UnitHeight,
     eccentricity,
-    off_grid,
     unit_heights,
-    walls,
 )
 from unitcad.casting.pouring import (
     BondFace,
@@ -37,7 +34,6 @@ from unitcad.casting.preparation import Printing, preparation, printing, tunnels
 from unitcad.casting.steps import BenchStep, Phase, phases
 from unitcad.casting.troubles import Trouble, troubles
 from unitcad.casting.views import views
-from unitcad.designs.dimensions import growth
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import warnings
 
@@ -78,8 +74,7 @@ class Procedure:
     `castings`: how often moulds of units are filled, if units are cast apart from the sheet.
     `bonds` are the tools' faces that must never get release agent.
     `tunnels`: the cups whose windows resin may cure shut.
-    `eccentricity` is that of the cups on the core, `without_ribs` the one without ribs or pins; None without cups.
-    `walls` is () if the tooling is not concentric: which of its walls a cup's play changes is then unknown.
+    `eccentricity` is that of the cups on the core; None without cups.
     """
 
     name: str
@@ -92,7 +87,6 @@ class Procedure:
     time_line: tuple[Phase, ...]
     printing: Printing
     preparation: tuple[BenchStep, ...]
-    off_grid: tuple[OffGrid, ...]
     unit_heights: tuple[UnitHeight, ...]
     pours: tuple[Pour, ...]
     bonds: tuple[BondFace, ...]
@@ -100,8 +94,6 @@ class Procedure:
     assembly: tuple[BenchStep, ...]
     measure: tuple[str, ...]
     eccentricity: Eccentricity | None
-    without_ribs: Eccentricity | None
-    walls: tuple[Figure, ...]
     bill: tuple[Item, ...]
     warnings: tuple[str, ...] = ()
     troubles: tuple[Trouble, ...] = ()
@@ -153,9 +145,6 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     last = " and ".join(["motor in"] * bool(motor or not skin) + ["skin on"] * bool(skin))
     motor += skin
     after = after_pours(moulds, silicones)
-    edges = tuple(off_grid(moulds))
-    printed = any(tool.made == "printed" for tool in plan.of_kind("tongue"))
-    slot = next((edge.nearest_mm / growth(spec) for edge in edges if edge.piece == "tongue" and printed), None)
     every = [*prepared, *(step for pour in pours for step in pour.steps), *out, *motor]
     return Procedure(
         name=spec.name,
@@ -166,16 +155,13 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         **times(prepared, pours, out, last, motor),
         printing=printing(moulds, printed_mm3),
         preparation=prepared,
-        off_grid=edges,
         unit_heights=tuple(unit_heights(moulds)),
         pours=pours,
         bonds=bond_faces(moulds),
         release=out,
         assembly=motor,
-        measure=tuple(measurements(moulds, grams, skin_g, slot)),
+        measure=tuple(measurements(moulds, grams, skin_g)),
         eccentricity=eccentricity(moulds),
-        without_ribs=eccentricity(moulds, with_ribs=False),
-        walls=walls(moulds) if plan.concentric else (),
         warnings=tuple(warnings(spec, estimate=False)) if moulds.makes == "unit" else (),
         troubles=troubles(moulds),
         makes=moulds.makes,

@@ -11,7 +11,7 @@ import msgspec
 
 from unitcad.casting.bill import Item, group_bill, in_words, plural, to_csv
 from unitcad.casting.drawings import cast_colour
-from unitcad.casting.figures import HELD, OVER_ALL
+from unitcad.casting.figures import OVER_ALL
 from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep, Phase, duration, number_steps
@@ -181,12 +181,6 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     yield from ("<details>", "<summary>Drawings</summary>", "")
     sections = (f"![pour {pour.index}]({pour.drawing})" for pour in procedure.pours)
     yield from (" ".join(sections), "")
-    for o in procedure.off_grid:
-        height, by = number(o.height_mm, 3), number(o.moved_mm, 2)
-        yield f"- {spaced(o.piece)}, {o.edge}: {height} mm; whole layers move it by {by} mm"
-    held = [f"{number(f.value, 3)} in pour {p.index}" for p in procedure.pours for f in p.figures if f.name == HELD]
-    if held:
-        yield f"- {HELD}: {join_words(held)} (computed)"
     # The height over all is among the measures.
     inside = [height for height in procedure.unit_heights if height.what != OVER_ALL]
     heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)

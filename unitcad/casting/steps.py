@@ -67,6 +67,7 @@ REQUIRED_TOOLS = {
     "pin": ("piece", "tool", ""),
     "blunt spatula": ("piece", "tool", ""),
     "level": ("piece", "tool", ""),
+    "spirit level": ("piece", "tool", "0.5 mm/m"),
     "paper": ("sheet", "tool", ""),
     "vice and two boards": ("set", "tool", ""),
     "pen": ("piece", "tool", ""),

@@ -18,7 +18,6 @@ from unitcad.casting.drawings import (
     CLEAR,
     DOWN,
     GREASE,
-    INK,
     TOOL,
     Extra,
     Offset,
@@ -27,10 +26,7 @@ from unitcad.casting.drawings import (
     cast_colour,
     grease_on_rim,
     on_tongues,
-    paper_in_slit,
     screwdrivers,
-    spirit_level,
-    tabs,
     tape,
     tape_places,
     tongue_prop,
@@ -47,7 +43,7 @@ from unitcad.moulds.lid import films
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
-from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, ring, union
+from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
 from unitcad.text import number
@@ -55,7 +51,7 @@ from unitcad.text import number
 ABOVE, UNDER, OVER, LOW = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6), (0.25, -1.0, 1.2), (0.55, -1.0, 0.3)
 """Directions towards the eye."""
 Views = Iterator[tuple[str, "View"]]
-Group = Literal["moulds", "under", "pieces", "unit", "cut", "curved"]
+Group = Literal["moulds", "under", "pieces", "unit", "curved"]
 
 
 @dataclass(frozen=True)
@@ -95,12 +91,12 @@ def place_pieces(
 def views(moulds: MouldSet) -> dict[str, View]:
     """Return every view of a procedure by its name, in the order of the steps."""
 
-    def made(blank: MouldSet) -> dict[str, View]:
+    def made() -> dict[str, View]:
         return {
-            name: replace(view, extras=(*view.extras, *_arrows(blank, view)), way=0) for name, view in _views(blank)
+            name: replace(view, extras=(*view.extras, *_arrows(moulds, view)), way=0) for name, view in _views(moulds)
         }
 
-    return moulds.once_a_geometry("views", made)
+    return moulds.once("views", made)
 
 
 def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
@@ -146,77 +142,30 @@ def level_on(moulds: MouldSet) -> Step:
 
 
 def _views(moulds: MouldSet) -> Views:
-    plan, (bottom, top), (cup_x, cup_y) = moulds.plan, moulds.plate, moulds.plan.layout.cup
+    plan, bottom = moulds.plan, moulds.plate[0]
     yield "pieces", View(place_pieces(plan.pieces), eye=OVER, group="pieces")
     if moulds.cast_flat:
         yield from _curved(moulds, moulds.cast_flat, views(moulds.cast_flat))
         return
-    yield from _single_pieces(moulds)
     base, first = place_pieces(plan.of_kind("base")), plan.steps[0]
     if not plan.of_kind("cup"):
         yield from _tray(moulds, base, first)
         return
-    paper = () if plan.pins else paper_in_slit(moulds)
-    pressed = arrow(DOWN, 0.0, -0.8 * cup_y, first.rim + 5, 8.0)
-    slit = (Name("paper", (cup_x + 6.0, 5.0 - cup_y, top)),) if paper else ()
-    names = *slit, _corner(moulds, first.rim)
-    yield "dry-fit", View((*base, Placed(first.cup)), (*paper, pressed), names=names)
+    pressed = arrow(DOWN, 0.0, -0.8 * plan.layout.cup[1], first.rim + 5, 8.0)
+    yield "dry-fit", View((*base, Placed(first.cup)), (pressed,), names=(_corner(moulds, first.rim),))
     if filaments := plan.of_kind("filament"):
         down = 1.2 * (moulds.dimensions.core_height - bottom)
         x, y = plan.layout.cells[0].x, -plan.layout.plate[1]
         names = Name("filament", (x, y * 0.8, bottom - down)), Name("groove", (x, y * 0.7, bottom))
         up = _beside_filaments(moulds, 1)
         yield "filament", View((*base, *place_pieces(filaments, z=-down)), up, UNDER, "under", names=names, way=0)
-    standing, on = (*base, *place_pieces(filaments)), level_on(moulds)
-    yield "level", _level((*standing, Placed(on.cup)), cup_x, on.rim, plan.layout.plate, bottom)
+    standing = *base, *place_pieces(filaments)
     for step in plan.steps:
         for name, view in _pour(moulds, step, standing):
             yield f"pour{step.index}-{name}", view
     yield from _demoulding(moulds)
     yield from _motor_in(moulds)
     yield from _skin_on(moulds)
-
-
-def _level(
-    parts: tuple[Placed, ...],
-    half: float,
-    z: float,
-    plate: tuple[float, float],
-    bottom: float,
-    group: Group = "moulds",
-) -> View:
-    """Return the view of a level on a surface at `z`, and of paper under a corner of the base."""
-    names = Name("level", (0.0, -4.0, z + 2)), Name("paper", (-plate[0] - 4, -plate[1], bottom))
-    return View(parts, spirit_level(half, z, plate, bottom), group=group, names=names)
-
-
-def _single_pieces(moulds: MouldSet) -> Views:
-    """Yield the views of pieces that are joined, of tongues that are cut, of a resin cup's windows."""
-    plan, exit = moulds.plan, moulds.dimensions.exit
-    strip = next((tool for tool in plan.of_kind("tongue") if tool.made == "cut"), None)
-    if strip and exit:
-        cell = plan.layout.cells[0]
-        side, half, radius = cell.sides[0], exit.width / 2, moulds.dimensions.ledge_radius
-        end = cell.x + side * (max(plan.layout.cup[0] - abs(c.x) for c in plan.layout.cells) + 6.0)
-        names = (
-            Name(f"radius {number(radius, 3)} mm", (cell.x - side * radius, cell.y, exit.high)),
-            Name(f"{number(exit.width, 3)} mm wide", ((cell.x + end) / 2, cell.y - half, exit.high)),
-            Name("tape", (end, cell.y - half, exit.high)),
-        )
-        hole = moved(ring(radius - 0.1, radius, exit.high - 0.05, exit.high + 0.05), cell.x, cell.y)
-        yield "cut-tongue", View((Placed(strip.name),), (Extra(hole, INK), tabs(moulds)[0]), OVER, "cut", names=names)
-        if step := next((step for step in plan.steps if step.windows), None):
-            wall = side * plan.layout.cup[0]
-            slid = Placed(strip.name, (0.5 * (wall - side * abs(cell.x)), 0.0, 0.0))
-            window = Name("window", (wall, cell.y - half, exit.high))
-            yield "clear-windows", View((Placed(step.cup, half=True), slid), names=(window,))
-    for split in plan.splits[:1]:
-        lying, pushed = split.pieces[:2]
-        left, front, _, right, _, high = bounds(moulds.mesh(lying))
-        x0, y0, z0, x1, _, z1 = bounds(moulds.mesh(pushed))
-        up = z1 - z0 + max(2 * CLEAR, 0.15 * (x1 - x0))
-        names = Name("piece 1", ((left + right) / 2, front, high)), Name("piece 2", ((x0 + x1) / 2, y0, z1 + up))
-        yield "join", View((*place_pieces([lying]), *place_pieces([pushed], z=up)), names=names)
 
 
 def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
@@ -254,17 +203,13 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         cell = min(lay.cells, key=lambda each: (each.y, -max(each.sides, default=0)))
         side = max(cell.sides, default=1)
         wall = cell.y - exit.width / 2, exit.high
-        pushed = *on_tongues(moulds, seat, GREASE), *tabs(moulds, seat)
+        pushed = on_tongues(moulds, seat, GREASE)
         greased = Name(f"grease {number(seat, 2)} mm", (side * (cup_x + seat / 2), *wall))
         yield "tongue-in", View((*cured, opened, *slid(seat)), pushed, names=(greased,))
-        pads, marks = tuple(Extra(pad, CARD) for pad in prop.pads), ()
+        on = tuple(Extra(pad, CARD) for pad in prop.pads)
         front = min(cell.y for cell in lay.cells if side in cell.sides) - GRIP_WIDTH / 2 - 1
         card = (Name("card", (side * (cup_x + prop.width_mm / 2), front, top + prop.thickness_mm / 3)),)
-        names = card
-        if len(plan.steps) > 1:
-            marks, names = on_tongues(moulds, 0.6, INK), (Name("pen mark", (side * (cup_x + 0.3), *wall)), *card)
-        on = *pads, *tabs(moulds)
-        yield "tongue-home", View((*cured, opened, *place_pieces(tongues)), (*on, *marks), names=names)
+        yield "tongue-home", View((*cured, opened, *place_pieces(tongues)), on, names=card)
     closed = *cured, Placed(step.cup), *place_pieces(tongues)
     lift, poured, colour = step.top - step.rim + 2 * CLEAR, place_pieces([step]), layer_colour(step.index - 1)
     off = Placed(step.lid or "", (0.0, 0.0, lift + moulds.hung(step)))
@@ -297,9 +242,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
     parts = *cured, Placed(step.cup), *poured
     if prop and exit:
         lid = (Placed(step.lid),) if step.lid else ()
-        kept = (each for each in held if each not in tabs(moulds))
-        pulled = *kept, *tabs(moulds, cup_x)
-        yield "tongue-out", View((*parts, *lid, *slid(cup_x)), pulled, names=card, way=1)
+        yield "tongue-out", View((*parts, *lid, *slid(cup_x)), held, names=card, way=1)
     if step.lid:
         yield "lid-off", View((*parts, off), way=1)
     if any(removal.piece == step.cup for removal in step.removals):
@@ -402,9 +345,8 @@ def is_fed_through(moulds: MouldSet) -> bool:
 
 def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
     """Yield the views of the one pour of a tray, a mould without cups."""
-    (x, y), lengths = moulds.plan.layout.plate, moulds.spec.moulds
+    x, lengths = moulds.plan.layout.plate[0], moulds.spec.moulds
     filled = *tray, *place_pieces([step])
-    yield "level", _level(tray, moulds.plan.layout.cup[0], step.rim, (x, y), moulds.plate[0])
     x0, y0, _, _, y1, _ = bounds(moulds.meshes(step.layer)[0])
     thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), x0 + 3.0, (y0 + y1) / 2)
     yield "pour", View(filled, (Extra(thread, cast_colour(moulds, 1)),))
@@ -434,7 +376,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
     for name, view in flat.items():
         if name in ("filament-out", "peel"):
             yield f"flat-{name}", view
-        elif view.group in ("moulds", "under", "cut"):
+        elif view.group in ("moulds", "under"):
             yield name, view
     count = len(plan.layout.cells)
     # Inserts, pour by pour, in the order of the cells; and the direction in which the unit of each cell is drawn off.
@@ -456,7 +398,6 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
     def last_pour() -> Views:
         """Yield the views from the empty curved base to the cured sheet without its lid."""
         yield "filament", pulled(place_pieces([base]), (), -1)
-        yield "level", _level((*standing, *place_pieces([lid])), x1, step.top, (x1, y1), bottom, "curved")
         raised = [
             Extra(shape, layer_colour(pour), _along(way, 2 * CLEAR))
             for pour, shapes in enumerate(laid)
@@ -583,52 +524,25 @@ def _solids(moulds: MouldSet, item: Placed | Extra, unit: bool) -> Iterator[Surf
 def _laid_out(
     moulds: MouldSet, solids: dict[_Key, list[Surface]]
 ) -> tuple[dict[_Key, list[Surface]], tuple[Name, ...]]:
-    """Lay tools out side by side in rows, on one plane, the pieces of a split one as they belong together; name them.
-
-    Tongues and filaments of several cavities are named by their number; pieces have their numbers written on them.
-    """
+    """Lay pieces out side by side in rows, on one plane, and name them; like ones of several cavities together."""
     plan = moulds.plan
-    places = {
-        piece.name: (split.tool, *divmod(i, split.columns))
-        for split in plan.splits
-        for i, piece in enumerate(split.pieces)
-    }
-    groups: dict[str, list[tuple[_Key, list[Surface]]]] = {}
-    for key, each in solids.items():
-        name = getattr(key[0], "name", "")
-        tool, row, column = places.get(name, (name, 0, 0))
-        groups.setdefault(tool, []).append((key, _shifted(each, (column * _GAP, -row * _GAP, 0.0))))
-    boxes = [_box([solid for _, each in group for solid in each])[1:] for group in groups.values()]
-    sizes = [tuple((high - low)[:2] + _GAP) for low, high in boxes]
+    points = [np.concatenate([solid.vertices for solid in each]) for each in solids.values()]
+    lows, highs = (np.array([pick(own, axis=0) for own in points]) for pick in (np.min, np.max))
+    sizes = [tuple(size) for size in (highs - lows)[:, :2] + _GAP]
     corners = layout(sizes, (1.25 * float(np.sqrt(np.prod(sizes, axis=1).sum())), 0.0))
     laid: dict[_Key, list[Surface]] = {}
     found: dict[str, list[tuple[float, float, float]]] = {}
-    numbers = []
-    for (name, group), (low, high), (x, y) in zip(groups.items(), boxes, corners, strict=True):
-        laid |= {key: _shifted(each, (x - low[0], -y - high[1], -low[2])) for key, each in group}
-        tool = plan.tool(name)
-        points, low, high = _box(laid[group[0][0]])
-        x, y, _ = (low + high) / 2
-        if len(group) > 1:  # at the left edge of its first piece
-            at = low[0], y, high[2]
-            for i, (key, _) in enumerate(group, 1):
-                _, low, high = _box(laid[key])
-                numbers.append(Name(str(i), (*((low + high) / 2)[:2].tolist(), float(high[2])), on=True))
-        else:  # near the front edge
-            off = np.hypot(points[:, 0] - x, points[:, 1] - 0.9 * low[1] - 0.1 * high[1]).round(1)
-            at = points[np.lexsort((-points[:, 2], off))[0]]
+    for (key, each), own, low, high, (x, y) in zip(solids.items(), points, lows, highs, corners, strict=True):
+        by = np.array((x - low[0], -y - high[1], -low[2]))
+        laid[key] = [replace(solid, vertices=solid.vertices + by) for solid in each]
+        # Its name is near the front edge.
+        middle, front = (low[0] + high[0]) / 2, 0.9 * low[1] + 0.1 * high[1]
+        off = np.hypot(own[:, 0] - middle, own[:, 1] - front).round(1)
+        at = own[np.lexsort((-own[:, 2], off))[0]] + by
+        name = getattr(key[0], "name", "")
+        tool = next(piece for piece in plan.pieces if piece.name == name)
         filament = "straight filament" if tool.step else "filament"
         called = {"tongue": "tongue", "filament": filament}.get(tool.kind, plan.called(name))
         found.setdefault(called, []).append((float(at[0]), float(at[1]), float(at[2])))
     names = (Name(f"{len(at)} {name}s" if len(at) > 1 else name, at[0]) for name, at in found.items())
-    return laid, (*numbers, *names)
-
-
-def _shifted(solids: list[Surface], by: tuple[float, float, float]) -> list[Surface]:
-    return [replace(solid, vertices=solid.vertices + by) for solid in solids]
-
-
-def _box(solids: list[Surface]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the points of solids, the lowest and the highest corner of their box."""
-    points = np.concatenate([solid.vertices for solid in solids])
-    return points, points.min(axis=0), points.max(axis=0)
+    return laid, tuple(names)

@@ -52,17 +52,10 @@ def _drawn(geometry: str) -> Plan:
     return plan(from_json(geometry))
 
 
-@lru_cache(maxsize=32)
-def _kept(geometry: str) -> dict[str, Any]:
-    """Return the cache of a geometry for the next set of it, by name."""
-    return {}
-
-
 def forget() -> None:
     """Drop cached plans, meshes and other results, as a measurement of times needs."""
 
     _drawn.cache_clear()
-    _kept.cache_clear()
     mesh.forget()
 
 
@@ -266,15 +259,6 @@ class MouldSet:
         if name not in self._kept:
             self._kept[name] = make()
         return self._kept[name]
-
-    def once_a_geometry(self, name: str, make: Callable[[MouldSet], _T]) -> _T:
-        """Return the result of `make` of the blank set, computed once under `name` for all sets of one geometry."""
-        if self.altered:
-            return self.once(name, lambda: make(self.blank))
-        kept = _kept(self.geometry)
-        if name not in kept:
-            kept[name] = make(self.blank)
-        return kept[name]
 
 
 def shallow_grooves(moulds: MouldSet) -> list[str]:

@@ -38,13 +38,10 @@ from unitcad.spec import Spec, printer_of
 
 MOST_DEG = 75.0
 """Of the sheet's ends from the top, at most (assumed): beyond it lid and base slide on each other as they close."""
-LARGEST = 1000.0
-"""Radius of a limb, at most, mm."""
-_STEP = 0.1
 
 
 def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> None:
-    """Raise Refusal for a limb too small or too large, with the nearest radius that fits.
+    """Raise Refusal for a limb too small or too large.
 
     `apart`: between two units' feet, mm. `middle`: from the limb's radius to that of the sheet's middle, mm.
     """
@@ -52,11 +49,7 @@ def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> 
     _check_vents(array, radius, middle)
     if not (why := _too_small(array, radius, apart, middle(radius))):
         return
-    radii = (tenth * _STEP for tenth in range(math.ceil(radius / _STEP + 1e-9), round(LARGEST / _STEP) + 1))
-    fits = next((each for each in radii if not _too_small(array, each, apart, middle(each))), None)
-    if fits is None or middle(fits) > _largest_middle(array) or array.layout["kind"] == "ring":
-        raise Refusal("limb.cast", "curved", f"{why}; cast it flat and bend it", "flat")
-    raise Refusal("limb.radius_mm", radius, why, round(fits, 1))
+    raise Refusal("limb.radius_mm", radius, why)
 
 
 def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) -> None:
@@ -72,10 +65,7 @@ def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) 
         f"the sheet reaches {end:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps air at "
         "its ends; cast it flat and bend it"
     )
-    fits = math.floor(min(radius, largest) / _STEP)
-    while middle(fits * _STEP) > largest:
-        fits -= 1
-    raise Refusal("limb.radius_mm", radius, why, round(fits * _STEP, 1))
+    raise Refusal("limb.radius_mm", radius, why)
 
 
 def _largest_middle(array: Array) -> float:

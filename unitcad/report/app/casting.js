@@ -7,12 +7,11 @@
 
   // Three digits: what a scale, a caliper or a clock on the bench shows.
   const shown = (value) => (typeof value === "number" ? number(value, 3) : value);
-  const quantity = (figure, decimals) => `${decimals === undefined ? number(figure.value, 3) : figure.value.toFixed(decimals)} ${figure.unit || ""}`.trim();
+  const quantity = (figure) => `${number(figure.value, 3)} ${figure.unit || ""}`.trim();
 
-  // So many decimals where lengths are compared.
-  function figures(list, summary, decimals) {
+  function figures(list, summary) {
     if (!list || !list.length) return null;
-    const rows = list.map((figure) => [figure.name, quantity(figure, decimals), figure.source]);
+    const rows = list.map((figure) => [figure.name, quantity(figure), figure.source]);
     const sources = table(["Figure", "Value", "Source"], rows, { label: summary });
     return el("details", {}, el("summary", {}, summary), sources);
   }
@@ -81,7 +80,6 @@
       return node;
     };
     const titled = (title, ...content) => content.some(Boolean) && [el("h3", {}, title), content];
-    const offGrid = data.off_grid || [];
     const pour = (each) => {
       const svg = variant.drawings[each.drawing];
       return el("div", { className: "pour" }, el("h3", {}, `Pour ${each.index}: ${partName(each.layer)}, ${each.material}`),
@@ -97,12 +95,10 @@
       times(data),
       titled("Print", data.printing && el("ul", {}, data.printing.how.map((text) => el("li", {}, text)))),
       titled("Before the first pour", steps(data.preparation)),
-      offGrid.length > 0 && el("details", {}, el("summary", {}, `${offGrid.length} edges fall between two of the printer's layers`),
-        table(["Piece", "Edge", "Height as printed (mm)", "Moved by (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, shown(row.height_mm), number(row.nearest_mm - row.height_mm, 2)]), { label: "Edges off the layer grid" })),
       (data.pours || []).map(pour),
       titled("Out of the mould", steps(data.release)),
       titled(data.last, steps(data.assembly)),
-      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "Effect of the cups' play on the walls", 2)),
+      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text)))),
       titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity, 3)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
   }
 
