@@ -123,3 +123,12 @@ def test_blanks_that_xml_does_not_know_are_no_part_of_a_number(blank, judge):
     moved = f'<build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 0 0{blank}5"/></build>'
     report = judge(package(model_xml(f'<object id="1">{mesh_xml()}</object>', moved)), "a.3mf")
     assert [found.code for found in report.findings if found.severity == "error"] == ["P017"]
+
+
+def test_an_image_that_is_damaged_in_the_zip_is_told(judge):
+    name = "Metadata/thumbnail.png"
+    whole = package(rels=rels_xml((START, "/3D/3dmodel.model"), (THUMBNAIL, f"/{name}")), more=[(name, PNG)])
+    assert not judge(whole, "a.3mf").findings
+    content = whole.index(name.encode(), whole.index(b"3dmodel.model")) + len(name)
+    report = judge(whole[: content + 9] + b"x" + whole[content + 10 :], "a.3mf")
+    assert [(one.code, one.locations[0].part) for one in report.findings] == [("F003", name)]

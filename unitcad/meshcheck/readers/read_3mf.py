@@ -388,12 +388,16 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
 
 
 def _expect_type(package: Package, part: str, rule: Rule, types: tuple[str, ...]) -> None:
-    """Add a finding if a part's content type is none of `types`."""
+    """Add a finding if a part's content type is none of `types`, or if it can't be unpacked."""
     content_type = package.content_type(part)
     if content_type is None:
         package.add(P001, f"{package.shown(part)} has no content type", part)
     elif content_type not in types:
         package.add(rule, f"{package.shown(part)} has type {content_type!r}, not {' or '.join(types)}", part)
+    try:
+        package.read(part)
+    except Unreadable as stop:
+        package.findings += stop.findings
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
