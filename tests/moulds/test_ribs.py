@@ -4,15 +4,17 @@ import math
 
 import numpy as np
 import pytest
-from faulty_sets import broken, set_of
+from faulty_sets import broken, set_of, with_fault
 
 from tests.sample_bodies import LEADLESS
 from unitcad.casting.figures import UNEVEN, eccentricity
 from unitcad.catalogue import printers
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.moulds.cup import rib_shapes, ribs
+from unitcad.moulds.base import draw_taper
+from unitcad.moulds.cup import rib_shapes, ribs, skirt_end, slot_shapes
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape import Common, box, cut, union
 from unitcad.validation import templates
 
 SETS = [
@@ -110,6 +112,41 @@ def test_a_rib_wider_into_the_plinth_than_half_a_line_is_refused():
         set_of("encapsulating", "moulds.rib_interference_mm=0.25")
     assert (refused.value.field, refused.value.nearest) == ("moulds.rib_interference_mm", 0.2)
     assert broken(set_of("encapsulating", "moulds.rib_interference_mm=0.2")) == set()
+
+
+def test_a_resin_cup_s_leaves_bend_within_the_limit_and_into_their_slots():
+    """By the beam's closed formula: 1.5 x 0.5 x 0.13 / 3.06^2, the arm from the crest's measured top to the seat."""
+    moulds = set_of("encapsulating", "moulds.printer=sla")
+    rib = ribs(moulds.spec, moulds.plan.layout)[0]
+    found = {f.where: f for f in check_moulds(moulds) if f.code == "C220" and "leaf" in f.where}
+    assert len(found) == 4
+    for cup in ("cup1", "cup2"):
+        strain, room = found[f"{cup}: strain at the root of a rib's leaf"], found[f"{cup}: room behind a rib's leaf"]
+        least, most = (150 * 0.5 * 0.13 / arm**2 for arm in (-rib.top, -rib.head))
+        assert least * 0.98 < strain.value < most * 1.02 < 1.2
+        assert room.value == pytest.approx(0.5, abs=0.005)
+
+
+def _leaf_broken(change):
+    moulds = with_fault(set_of("encapsulating", "moulds.printer=sla"), "cup1", change)
+    return {f.where for f in check_moulds(moulds) if f.code == "C220" and not f.ok}
+
+
+def test_faults_of_a_leaf_are_found():
+    """A slot that ends low, one that a flaw fills, a leaf twice as thick, and one that is not freed at one side."""
+    moulds = set_of("encapsulating", "moulds.printer=sla")
+    slots, rib = slot_shapes(moulds.spec, moulds.plan.layout)[0], ribs(moulds.spec, moulds.plan.layout)[0]
+    strain, room = "cup1: strain at the root of a rib's leaf", "cup1: room behind a rib's leaf"
+    x, y = rib.x, rib.y
+    recess = draw_taper(moulds.plan.layout, moulds.spec.moulds.plinth_clearance_mm, skirt_end(moulds.spec))
+
+    def filled(*space):
+        return lambda shape: union((shape, cut(Common((slots, box(*space))), [recess])))
+
+    assert _leaf_broken(filled(-20, 20, -20, 20, -1.0, 0.0)) == {strain}
+    assert _leaf_broken(filled(x - 0.2, x + 2, y - 1, y + 2, -9, 0.0)) == {strain, room}
+    assert _leaf_broken(filled(x, x + 1.1, y - 1.2, y + 1.2, -9, 0.0)) == {strain}
+    assert _leaf_broken(filled(x - 0.2, x + 2, y + 1.2, y + 2, -9, 0.0)) == {strain, room}
 
 
 def test_a_plinth_too_low_for_the_leaves_is_refused():

@@ -2,7 +2,8 @@
 
 Measured on the meshes: the patches in which cup and base overlap halfway up the ribs' crests. A patch's narrowest
 extent is the interference, and its direction that of the face that the rib bears on. If any two neighbouring directions
-are less than half a turn apart, the cup can't slip aside. A cup without ribs has a play.
+are less than half a turn apart, the cup can't slip aside. Ribs of resin are on leaves, which must bend without
+breaking, into the slot behind them. A cup without ribs has a play.
 """
 
 from __future__ import annotations
@@ -15,10 +16,13 @@ import numpy as np
 from manifold3d import CrossSection, Manifold
 
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
+from unitcad.checks.leaves import thickest_leaf
+from unitcad.designs.limits import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
 from unitcad.kernels.mesh import thick_parts
 from unitcad.moulds.cup import SQUARE, ribs
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.profile import GRID_PER_MM
+from unitcad.spec import printer_of
 
 FACES = 3
 """Faces that ribs bear on, at least: fewer leave a way to slip aside."""
@@ -63,6 +67,21 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         room = -shared.bounding_box()[5] if not shared.is_empty() else -standing[0].head
         advice = "the crushed rib lifts the cup off its seat"
         yield at_least("C220", f"{where}: from the seat down to a rib", room, -standing[0].head - GRID, "mm", advice)
+        if leaf_mm(printer_of(moulds.spec)):
+            yield from _bending(moulds, step.cup, max(depths), -room)
+
+
+def _bending(moulds: MouldSet, cup: str, depth: float, contact: float) -> Iterator[MouldFinding]:
+    """Measure how far a cup's leaves are strained, and whether they find room, if ribs bear up to z = `contact`."""
+    lengths, standing = moulds.spec.moulds, ribs(moulds.spec, moulds.plan.layout)
+    leaf = thickest_leaf(moulds.solids[cup], standing, lengths.plinth_clearance_mm)
+    pushed, arm = farthest_push(depth, lengths.xy_play_mm, lengths.plinth_clearance_mm), leaf.root - contact
+    strain = leaf_strain(leaf.thickness, pushed, arm) if arm > 0 else math.inf
+    advice = "the leaf under a rib breaks: it is too thick, or its slot too short"
+    yield at_most("C220", f"{cup}: strain at the root of a rib's leaf", 100 * strain, 100 * MOST_STRAIN, "%", advice)
+    # The straight part below the contact turns with it.
+    end = pushed * (1 + 1.5 * (contact - standing[0].foot) / arm) if arm > 0 else math.inf
+    yield at_least("C220", f"{cup}: room behind a rib's leaf", leaf.room, end, "mm")
 
 
 def _patches(cup: Manifold, base: Manifold, level: float) -> list[tuple[float, float]]:
@@ -119,6 +138,6 @@ def _travel(wall: CrossSection, plinth: CrossSection, way: tuple[int, int]) -> f
 
 CHECK = MouldCheck(
     "C220",
-    "centring: ribs bear on three faces with the spec's interference, and clear the seat",
+    "centring: ribs bear on three faces with the spec's interference, clear the seat and break no leaf",
     findings,
 )

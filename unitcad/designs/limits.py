@@ -66,13 +66,18 @@ def leaf_mm(printer: Printer) -> float:
     return float(printer.least_wall_mm) if printer.technology.value == "sla" else 0.0
 
 
+def leaf_strain(thickness: float, pushed: float, arm: float) -> float:
+    """Return the strain at the root of a leaf that is pushed aside by `pushed` at `arm` below it, mm."""
+    return 1.5 * thickness * pushed / arm**2
+
+
 def farthest_push(interference: float, play: float, clearance: float) -> float:
     """Return how far a rib is pushed back if the gap is printed narrower by the printer's play, mm."""
     return interference + min(play, clearance)
 
 
 def least_skirt(thickness: float, pushed: float) -> float:
-    """Return the height of a skirt, mm, whose leaves, pushed aside, are strained by no more than `MOST_STRAIN`."""
+    """Return the height of a skirt, mm, whose leaves are strained by no more than `MOST_STRAIN`."""
     return math.sqrt(1.5 * thickness * pushed / MOST_STRAIN) + CREST
 
 
