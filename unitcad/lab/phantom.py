@@ -15,7 +15,6 @@ from typing import Annotated, Any
 import numpy as np
 from msgspec import Meta, Struct
 
-from unitcad.attenuation.curve import rounded_error
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.inputs import TissueLayer, tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
@@ -318,7 +317,7 @@ class Expected:
 
     `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
     layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
-    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the template's
+    `echo_pct`: at the actual wall. `forearm`: the template's
     curve, `factor` the mean factor between the two.
     """
 
@@ -329,10 +328,8 @@ class Expected:
     sensitivity: Mapping[str, float]
     wall_mm: float
     echo_pct: float
-    soft_echo_pct: float
     forearm: tuple[float, ...]
     factor: float
-    error: float
 
 
 def medium(phantom: PhantomTable, recipes: Sequence[Recipe], **changed: Sequence[float]) -> LayeredMedium:
@@ -365,25 +362,17 @@ def wall_distance(phantom: PhantomTable, recipes: Sequence[Recipe]) -> float:
     return float(walls[at]) if at < len(walls) else math.inf
 
 
-def echo_pct(phantom: PhantomTable, recipes: Sequence[Recipe], wall_mm: float, **changed: Sequence[float]) -> float:
-    """Return the echo at the farthest point from a wall at a distance (mm) from the unit's centre, percent.
-
-    `changes` as in `medium`.
-    """
-    return 100 * float(_echo(phantom, medium(phantom, recipes, **changed), np.array([wall_mm]))[0])
-
-
 def _echo(phantom: PhantomTable, stack: LayeredMedium, walls: np.ndarray) -> np.ndarray:
     at = _farthest(phantom)
-    return _curve(phantom, stack, np.concatenate([[at], 2 * walls - at]))[0]
+    return _curve(phantom, stack, np.concatenate([[at], 2 * walls - at]))
 
 
-def _curve(phantom: PhantomTable, stack: LayeredMedium, r_mm: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return |u_z| at radii over that at the first one, and the last one's relative error."""
+def _curve(phantom: PhantomTable, stack: LayeredMedium, r_mm: np.ndarray) -> np.ndarray:
+    """Return |u_z| at radii over that at the first one."""
     load = UniformDisc(phantom.motor_diameter_mm / 2e3)
     response = stack.response(load, 2 * math.pi * phantom.frequency_hz, r_mm * 1e-3, rtol=_RTOL)
     u = np.abs(response.u_z)
-    return u[1:] / u[0], rounded_error(np.max(response.error_z) / u[-1])
+    return u[1:] / u[0]
 
 
 def expected(
@@ -398,9 +387,9 @@ def expected(
     r = phantom.unit_diameter_mm / 2 + np.concatenate([[0.0], distances])
 
     def curve(**changed: Sequence[float]) -> np.ndarray:
-        return _curve(phantom, medium(phantom, recipes, **changed), r)[0]
+        return _curve(phantom, medium(phantom, recipes, **changed), r)
 
-    value, error = _curve(phantom, medium(phantom, recipes), r)
+    value = curve()
     losses = [[one.loss[end] for one in recipes] for end in (1, 2)]
     cases = [value, *(curve(loss=loss) for loss in losses)]
     cases += [curve(modulus=[one.low_kpa for one in recipes]), curve(modulus=[one.high_kpa for one in recipes])]
@@ -409,13 +398,11 @@ def expected(
         thickness = [one.thickness_mm - (THINNER_MM if j == i else 0.0) for j, one in enumerate(phantom.layers)]
         cases.append(curve(thickness=thickness))
         sensitivity[layer.name] = round(float(cases[-1][-1] / value[-1] - 1), _DECIMALS)
-    arm, beyond = _curve(phantom, tissue_medium(forearm), r)[0], distances > 0
+    arm, beyond = _curve(phantom, tissue_medium(forearm), r), distances > 0
     factor = math.exp(float(np.mean(np.abs(np.log(value[beyond] / arm[beyond])))))
     value, low, high, arm = (tuple(one.tolist()) for one in (value, np.min(cases, 0), np.max(cases, 0), arm))
-    echoes = echo_pct(phantom, recipes, wall_mm), echo_pct(phantom, recipes, wall_mm, loss=losses[0])
-    return Expected(
-        tuple(distances.tolist()), value, low, high, sensitivity, least_wall_mm, *echoes, arm, factor, error
-    )
+    echo = 100 * float(_echo(phantom, medium(phantom, recipes), np.array([wall_mm]))[0])
+    return Expected(tuple(distances.tolist()), value, low, high, sensitivity, least_wall_mm, echo, arm, factor)
 
 
 SEGMENTS = 96

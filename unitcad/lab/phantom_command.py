@@ -15,7 +15,7 @@ import typer
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import Item, to_csv
-from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
+from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room
 from unitcad.catalogue import printers
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Out
@@ -261,14 +261,6 @@ def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, st
         f"{p.cure_h:.3g} h",
         f"without thinner, at {phantom.table.room_c:g} degC (data sheet at {DATASHEET_C:g}); thinner: longer",
     )
-    seconds = bubble_rise_s(p.frame_mm, one.silicone)
-    late = seconds / 60 > p.pot_life_min
-    yield (
-        "bubble of 0.2 mm through the layer",
-        f"{seconds / 60:.3g} min",
-        "computed: Stokes, without thinner; optimistic"
-        + ("; longer than the pot life: it stays in the layer, so degas the mix before pouring" if late else ""),
-    )
     yield "weight of a millimetre", f"{p.grams_per_mm:.2f} g", "computed: tells the thickness by the scale"
 
 
@@ -346,8 +338,7 @@ def _expectations(phantom: PhantomSet) -> Iterator[str]:
     yield ""
     yield (
         f"A wall sends back {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm at most: {phantom.inside_mm / 2:g} mm "
-        f"from the unit's centre, and {e.wall_mm:g} mm would give {table.most_echo_pct:g} % (a mirror's estimate). "
-        f"With the least loss factors it is {e.soft_echo_pct:.2g} %."
+        f"from the unit's centre, and {e.wall_mm:g} mm would give {table.most_echo_pct:g} % (a mirror's estimate)."
     )
 
 

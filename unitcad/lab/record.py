@@ -336,10 +336,8 @@ def measure_record(
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
         findings.append(finding("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
-    fits = _fits(samples, rate, band, campaign.chain.mains_hz, sensors)
-    for fit, channel, gaps, where in zip(fits, samples.T, signal.missing, names, strict=True):
-        level = fit.clipped if fit else _clipped(channel)
-        if level < np.inf:
+    for channel, gaps, where in zip(samples.T, signal.missing, names, strict=True):
+        if (level := clip_level(channel)) < np.inf:
             findings.append(finding("L101", where, f"at about {level:.2f} of the amplitude"))
         if gaps:
             message = f"{gaps} of {signal.count} samples ({gaps / signal.count:.2g} of them) are no numbers"
@@ -349,6 +347,7 @@ def measure_record(
     none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, picture, ())
     if any(one.code == "L101" for one in findings):
         return replace(none, findings=tuple(findings))
+    fits = _fits(samples, rate, band, campaign.chain.mains_hz)
     for each, where in zip(fits, names, strict=True):
         if each is None:
             message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz"
@@ -410,13 +409,7 @@ def displacement(sensor: SensorTable, frequency_hz: float) -> complex:
     return 1e6 * si / (2j * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
 
 
-def _fits(
-    samples: Floats,
-    rate: float,
-    band: tuple[float, float],
-    mains_hz: float,
-    sensors: tuple[SensorTable, ...],
-) -> list[LineFit | None]:
+def _fits(samples: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> list[LineFit | None]:
     """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
     fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
@@ -457,10 +450,3 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str) -> list[Lab
     if fit.snr < LEAST_SNR and scatter <= MOST_SCATTER:  # a modulation is no noise
         say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
     return sorted(out, key=lambda one: one.code)
-
-
-def _clipped(samples: Floats) -> float:
-    good = np.isfinite(samples)
-    if good.sum() < 16 or not np.ptp(samples[good]) > 0:
-        return float("inf")
-    return clip_level(np.where(good, samples - np.median(samples[good]), 0.0), good)

@@ -26,8 +26,7 @@ class LineFit:
     `drift` is the range of the frequency over its mean, `snr` the amplitude over the residual's standard deviation,
     `scatter` the standard deviation of the amplitude of blocks over
     their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
-    exceeds noise, otherwise 0; `missing` the fraction without numbers. `clipped` is the level at which the signal is
-    cut off over its true amplitude, infinite if it is not cut off.
+    exceeds noise, otherwise 0; `missing` the fraction without numbers.
     """
 
     amplitude: float
@@ -43,7 +42,6 @@ class LineFit:
     masked: float
     dropped: float
     missing: float
-    clipped: float
     mains_hz: float
     """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
     second_hz: float

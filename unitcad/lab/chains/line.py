@@ -52,7 +52,6 @@ def fit_line(
     time = np.arange(len(x)) / rate
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
-    clipped = clip_level(x, good)
     deviation = 1.4826 * np.median(np.abs(x[good]))
     known = good & (np.abs(x) < 6 * deviation) if deviation > 0 else good
 
@@ -120,7 +119,6 @@ def fit_line(
             masked=masked,
             dropped=masked if beyond_noise else 0.0,
             missing=float(np.mean(~good)),
-            clipped=clipped,
             mains_hz=order * mains_hz,
             second_hz=frequency + beside if beside else 0.0,
             phase=phase,
@@ -234,17 +232,19 @@ LEAST_VALUES = 8
 """Different values below which a channel shows its converter's steps and no motion that a limit could cut off."""
 
 
-def clip_level(x: Floats, good: Bools) -> float:
-    """Return the level at which samples about zero are cut off, over their true amplitude; infinite without a plateau.
+def clip_level(x: Floats) -> float:
+    """Return the level at which samples are cut off, over their true amplitude; infinite without a plateau.
 
     The true amplitude is that of a sine which is cut off as often; the level is 0 if that is half of the time or more.
     One plateau is enough, and the lower of two counts.
     """
-    part = float("inf")
-    low, high = np.quantile(x[good], [0.05, 0.95])
-    for sign in (1.0, -1.0) if len(np.unique(x[good])) >= LEAST_VALUES else ():
-        signed = sign * x
-        peak = float(signed[good].max())
+    part, x = float("inf"), x[np.isfinite(x)]
+    if len(x) < LEAST_SAMPLES or len(np.unique(x)) < LEAST_VALUES:
+        return part
+    x = x - np.median(x)
+    low, high = np.quantile(x, [0.05, 0.95])
+    for signed in (x, -x):
+        peak = float(signed.max())
         below = NEAR * peak
         if 4 * peak <= high - low:  # cut off near the middle: the median is on the plateau, the band one of the range
             if high <= low:
@@ -252,9 +252,9 @@ def clip_level(x: Floats, good: Bools) -> float:
             below = NEAR * (high - low) / 2
         elif peak <= 0:
             continue
-        near = good & (signed >= peak - below)
-        if near.sum() > CROWD * good.sum() or (peak > 0 and _repeats(signed[good], peak)):
-            part = min(part, max(float(np.cos(np.pi * near.sum() / good.sum())) / (1 - NEAR), 0.0))
+        near = np.count_nonzero(signed >= peak - below)
+        if near > CROWD * len(x) or (peak > 0 and _repeats(signed, peak)):
+            part = min(part, max(float(np.cos(np.pi * near / len(x))) / (1 - NEAR), 0.0))
     return part
 
 
