@@ -50,6 +50,15 @@ def folder(tmp_path):
     return tmp_path
 
 
+def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path):
+    repeats(tmp_path, e=wave(90, 44.0) + wave(27, 88.0, 1), m=wave(300, 44.0) + wave(90, 88.0, 1))
+    result = campaign(tmp_path, UNIT)
+    assert result.levels == ()
+    outside = [one.message for one in result.findings if one.code == "L117"]
+    assert len(outside) == 6
+    assert "about 44 Hz" in outside[0]
+
+
 def test_a_campaign_has_the_levels_of_its_truth(folder):
     result = measure(read_campaign(folder / "c.toml"), folder)
     assert result.findings == ()

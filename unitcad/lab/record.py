@@ -69,6 +69,9 @@ RULES = {
             """L116 error: motor and unit at different frequencies
             No line of the unit is within a tenth of the motor's frequency: no level is given.
             Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
+            """L117 error: stronger line below the band
+            A line below chain.band_hz is stronger than the one in it, which may be its harmonic.
+            Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
             """L118 warning: low signal to noise
             The amplitude is less than ten times the standard deviation of the residual. Example: A point far from
             the unit. Fix: Record longer, average more, or a sensor of a smaller range.""",
@@ -254,6 +257,7 @@ MOST_SCATTER, NO_SCATTER, MOST_DRIFT = 0.05, 0.25, 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1
 LEAST_STEADY = 0.5
+TREMOR_HZ = 20
 """Part of a record that its steady part is at least: a motor that spins up and runs leaves more of 2 s."""
 LEAST_SNR = 10.0
 LEAST_OVER_U = 5
@@ -363,6 +367,9 @@ def measure_record(
         message = f"steady for {steady:.2f} s of {length:.2f} s; only that part was used"
         findings.append(finding("L107", shown, message))
     hertz = fit.frequency_hz
+    below = _stronger_below(frequency, size, campaign.chain.band_hz[0], campaign.chain.mains_hz, hertz)
+    if below is not None:
+        findings.append(finding("L117", shown, f"a stronger line is at about {below:.0f} Hz, below chain.band_hz"))
     scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
     factor, ratio = abs(scales[0]), None
     if motor is not None:
@@ -416,6 +423,15 @@ def _fits(samples: Floats, rate: float, band: tuple[float, float], mains_hz: flo
         fit = fit_line(samples[:, i], rate, band, mains_hz, fits[0] if fits else None)
         fits.insert(0, fit if fit and fit.amplitude > 0 else None)
     return fits
+
+
+def _stronger_below(frequency: Floats, size: Floats, low: float, mains_hz: float, own_hz: float) -> float | None:
+    """Return the frequency of a line below `low` in a spectrum that is stronger than the one at `own_hz`, if any."""
+    near = max(1.0, 3 * float(frequency[1]))
+    below = (frequency > TREMOR_HZ) & (frequency < low - near) & (np.abs(frequency - mains_hz) > near)
+    at = int(np.argmax(np.where(below, size, 0.0)))
+    own = size[np.abs(frequency - own_hz) <= near].max(initial=0.0)
+    return float(frequency[at]) if below[at] and size[at] > own else None
 
 
 def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str) -> list[LabFinding]:
