@@ -132,9 +132,7 @@ def arrays() -> dict[str, bytes]:
         "array-band-bent.png": band["pictures/patch-bent.png"](),
         "array-band-tools.png": band["pictures/tools.png"](),
         "array-curved-tools.png": sleeve["pictures/tools.png"](),
-        "array-curved-pour2.png": sleeve["pictures/pour2.png"](),
         "array-crosstalk.svg": maps["crosstalk.svg"],
-        "array-crosstalk-patch.svg": maps["crosstalk-patch.svg"],
     }
 
 

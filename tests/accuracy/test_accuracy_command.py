@@ -217,3 +217,8 @@ def test_the_command_shows_every_part(rows, monkeypatch):
     for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Time saved"):
         assert part in text.stdout
     assert len(text.stdout.splitlines()) < 60
+
+
+def test_a_medium_without_the_finest_reference_is_compared_with_the_next():
+    rows = survey._medium(("undamped", 2))
+    assert all(row["over_bound"] <= 1 for row in rows)

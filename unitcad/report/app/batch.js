@@ -93,7 +93,7 @@
     const preferred = (list, pattern) => list.find((name) => pattern.test(name) && (list === texts || filled(name) * 2 > table.rows.length));
     // The level of the best model that reads what goes across; else a volume, else anything.
     const levels = Object.keys(errors).map((model) => `edge_${model}`);
-    const best = (x) => [...levels, ...numeric].find((name) => numeric.includes(name) && U.modelOf(name) && filled(name) * 2 > table.rows.length && !blind(x, name))
+    const best = (x) => [...levels, ...numeric].find((name) => name !== x && numeric.includes(name) && U.modelOf(name) && filled(name) * 2 > table.rows.length && !blind(x, name))
       || preferred(numeric.filter((name) => !blind(x, name)), /volume|mm3/) || numeric.find((name) => name !== x && !blind(x, name)) || names[names.length - 1];
     const across = preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0];
     const controls = el("div", { className: "tools" },
