@@ -62,8 +62,6 @@ def test_a_ratio_with_a_single_unit_is_none():
         ((NINE, "encapsulating"), "SPEC = 'encapsulating': is a unit"),
         ((NINE, "--model", "paper"), "--model = 'paper'"),
         ((NINE, "--set", "layout.pitch_mm=14"), "nearest accepted"),
-        ((NINE, "--frequency", "0"), "--frequency"),
-        ((NINE, "--frequency", "100:200:50"), "one frequency"),
     ],
 )
 def test_what_an_array_has_not_is_refused(words, said):

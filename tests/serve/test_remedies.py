@@ -138,7 +138,6 @@ def test_a_bed_that_is_too_small_is_refused_at_the_count_that_was_changed():
     edits = [Edit(path="layout.pitch_mm", value=18), Edit(path="layout.columns", value=50)]
     since = [Edit(path="layout.columns", value=3), Edit(path="layout.pitch_mm", value=18)]
     fault = faults("forearm-patch", edits, since, "moulds")[0]
-    assert "layout.columns = 9 would do" in fault.message
     assert (fault.field, fault.at, fault.at_nearest) == ("moulds.bed_x_mm", "layout.columns", 9)
 
 
