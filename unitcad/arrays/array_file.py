@@ -254,6 +254,7 @@ def suggest_for_array(refusal: Refusal, data: Mapping[str, Any], judge: Judge = 
 
     def tried(changed: dict[str, Any]) -> object:
         nonlocal left
+        # Rings twice: a hexagon's places grow as their square.
         keys = "columns", "rows", "count", "bands", "rings", "rings"
         counts = (at(changed, f"layout.{key}") for key in keys)
         left -= max(1, math.prod(count for count in counts if isinstance(count, int)))

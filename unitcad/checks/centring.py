@@ -15,13 +15,12 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
+from unitcad.checks.finding import GRID, MouldCheck, MouldFinding, at_least, at_most
 from unitcad.checks.leaves import thickest_leaf
 from unitcad.designs.limits import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
 from unitcad.kernels.mesh import thick_parts
 from unitcad.moulds.cup import SQUARE, ribs
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import printer_of
 
 FACES = 3
@@ -30,8 +29,6 @@ WIDEST_DEG = 150.0
 """Largest angle between neighbouring directions in which a cup is centred: at 180 it can slip aside between them."""
 SAME_DEG = 20.0
 """Directions nearer than this are those of one face."""
-GRID = 3 / GRID_PER_MM
-"""Change of the interference by snapping crest and face to the grid, mm."""
 FARTHEST, NEAR = 4.0, 1e-4
 """How far a play is looked for, and how finely, mm."""
 

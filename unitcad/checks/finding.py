@@ -7,6 +7,10 @@ from dataclasses import asdict, dataclass
 from typing import TypedDict
 
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape.profile import GRID_PER_MM
+
+GRID = 3 / GRID_PER_MM
+"""Change of a distance by snapping the two faces that it is between to the grid, mm."""
 
 
 class FindingRecord(TypedDict):

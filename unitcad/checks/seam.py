@@ -14,7 +14,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
 from unitcad.checks.draw import BLOCKED, blocked
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
+from unitcad.checks.finding import GRID, MouldCheck, MouldFinding, at_least, at_most
 from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
 from unitcad.kernels.mesh import arrays, thick_pieces
@@ -22,12 +22,9 @@ from unitcad.moulds.cavities import united
 from unitcad.moulds.cuts import Split
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape.profile import GRID_PER_MM
 
 WEEP = 0.01
 """Silicone in the seams of a pour, at most, as a share of its layer (assumed): far less than what is mixed over."""
-GRID = 3 / GRID_PER_MM
-"""Change of a gap by snapping its two borders to the grid, mm."""
 THIN = 1e-3
 """Two heights nearer than this have no slice between them, and nearer borders count as touching, mm."""
 

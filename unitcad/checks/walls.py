@@ -11,15 +11,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
+from unitcad.checks.finding import GRID, MouldCheck, MouldFinding, at_least
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape.profile import GRID_PER_MM
-
-GRID = 3 / GRID_PER_MM
-"""Wall thickness that snapping two faces to the grid may take, mm."""
 
 SHOWN = 2.0
 """Walls thicker than this times the limit are not told apart."""

@@ -282,8 +282,11 @@ def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], d
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
     swept = _swept(columns)
     columns = _in_order(columns, swept)
-    there = {each.folder: each.folder for each in variants}
-    rows = [[there.get(entry.get("folder") or "", ""), *(_cell(entry.get(c)) for c in columns)] for entry in entries]
+    there = {each.folder for each in variants}
+    rows = [
+        [folder if (folder := entry.get("folder")) in there else "", *(_cell(entry.get(c)) for c in columns)]
+        for entry in entries
+    ]
     return ResultsTable(columns, rows, [name for name in columns if name in swept])
 
 
