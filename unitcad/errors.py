@@ -11,10 +11,8 @@ import shlex
 import sys
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
-from importlib import metadata
 from pathlib import Path
 from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 from unitcad.text import some, toml
 
@@ -66,6 +64,9 @@ def pip_install() -> list[str]:
 
 def install_command(extras: str) -> str:
     """Return the command that adds extras to this installation, from the folder or address that it came from."""
+    from importlib import metadata  # this and the next load email, http and ssl: a sixth of the start of a check
+    from urllib.request import url2pathname
+
     try:
         source = json.loads(metadata.distribution("unitcad").read_text("direct_url.json") or "{}")
     except (metadata.PackageNotFoundError, ValueError):

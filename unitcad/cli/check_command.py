@@ -20,7 +20,6 @@ from msgspec import Meta, Struct, field
 from unitcad import catalogue, files
 from unitcad.catalogue import Printer, printers
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
-from unitcad.export import finding_pictures
 from unitcad.files import no_such_file, path_seen_from
 from unitcad.meshcheck import Limits, Options, file_checks
 from unitcad.meshcheck import manifest as listing
@@ -262,7 +261,11 @@ def check(
         )
     for pattern, codes in settings.per_file_ignores.items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
-    draw = None if pictures is None else partial(finding_pictures.write, Path(pictures))
+    draw = None
+    if pictures is not None:
+        from unitcad.export import finding_pictures  # loads Pillow
+
+        draw = partial(finding_pictures.write, Path(pictures))
     memory = memory or settings.memory or 8000
     check_all = partial(file_checks.check_files, jobs=jobs, memory_mb=memory, then=draw)
     left_out = configuration.left_out(exclude or [])
