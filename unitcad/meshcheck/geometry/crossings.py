@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -111,6 +113,8 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
     return np.flatnonzero(two)[against][flat][thin], height[thin], higher[thin]
 
 
+Pairs = tuple[Ints, Ints]
+_AHEAD = 8  # blocks that wait for the second thread
 _BLOCK = 1 << 17  # pairs of faces decided together
 _PAIRS = 1 << 15  # of which so many are sieved together: enough to outweigh the calls, few enough for the cache
 _MOST_LOOKS, _LOOKS = 50_000_000, 100  # pairs looked at, in all and a face
@@ -174,10 +178,11 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
     tick()
     faces = _prepared(topology, order)
     crossings = Crossings(faces, Contacts(topology.n_shells, max(MOST_CONTACTS, 2 * len(order))))
-    slabs, waiting = slabs_of(steps, *faces.corners), list[tuple[Ints, Ints]]()
+    slabs, waiting = slabs_of(steps, *faces.corners), list[Pairs]()
     try:
-        for i, j in meeting_pairs(boxes.take(order, axis=0), tick):
-            waiting.append(slabs.meeting(*_strangers(faces, i, j)))
+        pairs = meeting_pairs(boxes.take(order, axis=0), tick)
+        for near in _ahead(lambda block: slabs.meeting(*_strangers(faces, *block)), pairs):
+            waiting.append(near)
             if sum(len(some) for some, _ in waiting) > _BLOCK:
                 _decide(faces, waiting, crossings)
                 waiting = []
@@ -188,6 +193,21 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
         crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
     _leaning(crossings)
     return crossings
+
+
+def _ahead(sieve: Callable[[Pairs], Pairs], blocks: Iterator[Pairs]) -> Iterator[Pairs]:
+    """Yield the sieved blocks in their order; a second thread sieves while this one finds the next blocks."""
+    coming = deque[Future[Pairs]]()
+    with ThreadPoolExecutor(1) as thread:
+        for block in blocks:
+            try:
+                coming.append(thread.submit(sieve, block))
+            except RuntimeError:  # no room for the stack of a thread
+                raise MemoryError from None
+            if len(coming) > _AHEAD:
+                yield coming.popleft().result()
+        while coming:
+            yield coming.popleft().result()
 
 
 def _prepared(topology: Topology, order: Ints) -> Faces:
@@ -209,7 +229,7 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
     )
 
 
-def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+def _strangers(faces: Faces, i: Ints, j: Ints) -> Pairs:
     """Drop pairs that share a vertex whose star is a height field."""
     apart = np.ones(len(i), bool)
     mine = [corner.take(i, mode="clip") for corner in faces.safe]
@@ -221,7 +241,7 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return i[keep], j[keep]
 
 
-def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
+def _decide(faces: Faces, waiting: list[Pairs], crossings: Crossings) -> None:
     """Decide pairs of faces that are near each other: planes first, then exact signs."""
     if not waiting or crossings.kept > _FEW:
         return
