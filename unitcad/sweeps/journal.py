@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from array import array
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -103,11 +102,6 @@ class Preview(Struct, frozen=True, kw_only=True):
 
 
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
-NOT_THERE = -1
-FORMAT = 2
-"""Version of the lines. A journal of version 1, which had no checksums, is replaced."""
-LONGEST = 1 << 26
-"""Bytes of a line, at most; a longer one is damaged."""
 
 
 class Journal:
@@ -118,9 +112,9 @@ class Journal:
 
     def __init__(self, out: Path, head: BatchHead) -> None:
         self.out = out
-        self.head = {"format": FORMAT, **to_builtins(head), "code": code_version()}
+        self.head = {**to_builtins(head), "code": code_version()}
         self._seed = zlib.crc32(_text(self.head))
-        self._lines = array("q")
+        self._starts: dict[int, int] = {}  # of the last line of each variant, in the order of their first ones
         self.damaged = 0
         self._lock = _lock(out, head)
         try:
@@ -134,7 +128,7 @@ class Journal:
         start = self._file.seek(0, os.SEEK_END)
         self._file.write(_pack(to_builtins(entry), self._seed))
         self._file.flush()
-        self._note(entry.index, start)
+        self._starts[entry.index] = start
 
     def entry(self, index: int) -> JournalEntry | None:
         """Return the last entry of a variant; a variant equal to another one gets that one's entry."""
@@ -148,7 +142,7 @@ class Journal:
 
     def entries(self) -> Iterator[JournalEntry]:
         """Yield every variant's entry in the sweep's order, read one by one."""
-        return (entry for index in range(len(self._lines)) if (entry := self.entry(index)) is not None)
+        return (entry for index in sorted(self._starts) if (entry := self.entry(index)) is not None)
 
     def close(self) -> None:
         """Let go of the folder."""
@@ -163,78 +157,57 @@ class Journal:
 
     def _own(self, index: int) -> JournalEntry | None:
         """Return the last line of a variant as it was written; None if there is none."""
-        if not 0 <= index < len(self._lines) or self._lines[index] == NOT_THERE:
+        if index not in self._starts:
             return None
-        self._file.seek(self._lines[index])
-        return _entry(self._file.readline(LONGEST), self._seed)
-
-    def _note(self, index: int, offset: int) -> None:
-        while len(self._lines) <= index:
-            self._lines.append(NOT_THERE)
-        self._lines[index] = offset
+        self._file.seek(self._starts[index])
+        return _entry(self._file.readline(), self._seed)
 
     def _open(self, path: Path) -> IO[bytes]:
-        """Open the journal's file with whole lines only: those of this batch, or just a head."""
-        continued = path.exists() and self._continues(path)
-        if not continued or self.damaged or not _ended(path):
-            with files.writing(path, sync=True) as file:
-                file.write(_pack(self.head, 0))
-                if continued:
-                    file.writelines(line for line, _ in self._entries(path))
-        file = open(path, "ab+")  # noqa: SIM115
-        file.seek(0)
-        offset = len(file.readline())
-        for line, entry in self._entries(path):
-            self._note(entry.index, offset)
-            offset += len(line)
-        return file
+        """Write the journal's file anew with the whole lines of an earlier run of this batch, and open it."""
+        earlier = self._earlier(path) if path.exists() else iter(())
+        with files.writing(path, sync=True) as file:
+            file.write(_pack(self.head, 0))
+            for line in earlier:
+                entry = _entry(line, self._seed)
+                if entry is None:
+                    self.damaged += 1
+                    continue
+                self._starts[entry.index] = file.tell()
+                file.write(line)
+        return open(path, "ab+")
 
-    def _continues(self, path: Path) -> bool:
-        """Check whether a journal is this batch's, of this version of the code; count the lines that are damaged.
+    def _earlier(self, path: Path) -> Iterator[bytes]:
+        """Yield the lines below the head of a journal of this batch; none of those of other code.
 
         Raises UnitcadError if the folder has another batch.
         """
         if path.is_symlink() or not path.is_file():
             raise UnitcadError(f"{path}: is not a file; choose another folder with -o")
+        whole = _pack(self.head, 0)
         with open(path, "rb") as file:
-            first = file.readline(LONGEST)
-            whole = sum(1 for _ in self._entries(path))
-            there = _head(first)
-            torn = _pack(self.head, 0) != first
-            if there is None and whole == 0:
-                if first.strip(b"\0 \n") and not _pack(self.head, 0).startswith(first):
-                    raise UnitcadError(
-                        f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or "
-                        "delete the journal to have finished variants checked again"
-                    )
-                return False
-            if there is not None and there["batch"] != self.head["batch"]:
+            first = file.readline()
+            there = _unpack(first, 0)
+            if there is None:
+                if not any(_entry(line, self._seed) for line in _lines(file)):
+                    if first.strip(b"\0 \n") and not whole.startswith(first):
+                        raise UnitcadError(
+                            f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or "
+                            "delete the journal to have finished variants checked again"
+                        )
+                    return
+                self.damaged += 1
+                file.seek(len(first))
+            elif there["batch"] != self.head["batch"]:
                 raise _another(path.parent, there["name"])
-            if there is not None and there != self.head:
-                return False
-            self.damaged = sum(1 for line in _lines(file)) - whole + torn
-        return True
-
-    def _entries(self, path: Path) -> Iterator[tuple[bytes, JournalEntry]]:
-        """Yield the whole lines below the head, and their entries."""
-        with open(path, "rb") as file:
-            file.readline(LONGEST)
-            for line in _lines(file):
-                entry = _entry(line, self._seed)
-                if entry is not None:
-                    yield line, entry
+            elif there != self.head:
+                return
+            yield from _lines(file)
 
 
 def _lines(file: IO[bytes]) -> Iterator[bytes]:
     """Yield the rest of a file by lines; a last one without its line end gets one."""
-    while line := file.readline(LONGEST):
+    for line in file:
         yield line if line.endswith(b"\n") else line + b"\n"
-
-
-def _ended(path: Path) -> bool:
-    with open(path, "rb") as file:
-        file.seek(-1, os.SEEK_END)
-        return file.read() == b"\n"
 
 
 def _text(data: dict[str, Any]) -> bytes:
@@ -262,18 +235,6 @@ def _entry(line: bytes, seed: int) -> JournalEntry | None:
         return None if data is None else convert(data, JournalEntry)
     except ValidationError:
         return None
-
-
-def _head(line: bytes) -> dict[str, Any] | None:
-    """Return a journal's head; None if the line is none. Version 1 has no checksum."""
-    head = _unpack(line, 0)
-    if head is None:
-        try:
-            head = json.loads(line)
-            return head if head["batch"] and head["name"] and "format" not in head else None
-        except (ValueError, KeyError, TypeError, RecursionError):
-            return None
-    return head
 
 
 def _another(out: Path, name: str) -> UnitcadError:
