@@ -33,8 +33,6 @@ FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
 _CLAIMS, _CLAIM_S = 40, 0.05
 """How often a cache that is being deleted is tried, and the pause between, s."""
-_DECODED = 64
-"""Entries that a store keeps decoded: variants of a geometry read the same few."""
 
 
 class DiskStore:
@@ -43,16 +41,14 @@ class DiskStore:
     Entries are written under a temporary name and renamed. Each process verifies the checksum of content and entries on
     first use and watches size and time of change afterwards; whatever does not match is removed and made again. An
     entry that can't be written (no space, read-only) is no error: the content is held in memory for this process
-    instead. The data of an entry are shared by all callers and must not be changed.
+    instead.
     """
 
     def __init__(self, root: Path) -> None:
         self.root = Path(root)
-        self._contents = str(self.root / "content")
         self.counts: Counter[str] = Counter()
         self._verified: dict[str, tuple[int, int, int]] = {}
         self._touched: dict[Path, float] = {}
-        self._decoded: dict[Path, tuple[tuple[int, int, int], Any]] = {}
         self._held: dict[str, bytes] = {}
         _claim(self.root)
         # Held while the store lives: see `collect`.
@@ -82,10 +78,10 @@ class DiskStore:
         if sha256 in self._held:
             return True
         try:
-            now = _signature(self._content_name(sha256))
+            path = self._content_path(sha256)
+            now = _signature(path)
             if self._verified.get(sha256) == now:
                 return True
-            path = self._content_path(sha256)
             if digest(read(path)) == sha256:
                 self._verified[sha256] = now
                 return True
@@ -105,7 +101,7 @@ class DiskStore:
             path = self._content_path(sha256)
             try:
                 self._write(path, content, shared=True)
-                self._verified[sha256] = _signature(str(path))
+                self._verified[sha256] = _signature(path)
             except OSError:
                 self._held[sha256] = content
         return sha256
@@ -135,9 +131,8 @@ class DiskStore:
         if sha256 in self._held:
             write_new(target, self._held[sha256], sync=True)
             return
-        name = self._content_name(sha256)
         try:
-            os.link(name, target)
+            os.link(self._content_path(sha256), target)
             return
         except FileNotFoundError:
             if not Path(target).parent.is_dir():
@@ -146,13 +141,7 @@ class DiskStore:
         except OSError as error:
             if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EEXIST):
                 raise
-            full = error.errno == errno.EMLINK
         write_new(target, self.content(sha256), sync=True)
-        if full:
-            # The file has as many links as the file system allows: a fresh one takes its place.
-            with contextlib.suppress(OSError):
-                self._write(Path(name), Path(target).read_bytes(), shared=True)
-                self._verified[sha256] = _signature(name)
 
     @contextlib.contextmanager
     def _entry(self, kind: str, key: str, intact: Intact) -> Iterator[Entry]:
@@ -177,10 +166,6 @@ class DiskStore:
         """Return an entry's data, or None; an entry that is damaged or was written for another key is removed."""
         path = self._path(kind, key)
         try:
-            now = _signature(str(path))
-            there, data = self._decoded.get(path, (None, None))
-            if there == now:
-                return data if intact(data) else None
             checksum, _, payload = read(path).partition(b"\n")
         except OSError:
             return None
@@ -188,9 +173,6 @@ class DiskStore:
             checksum = payload = b""
         if _checksum(kind, key, payload) == checksum:
             data = msgspec.json.decode(payload)
-            if len(self._decoded) >= _DECODED:
-                self._decoded = {}
-            self._decoded[path] = now, data
             return data if intact(data) else None
         remove(path)
         self.counts["damaged"] += 1
@@ -237,11 +219,7 @@ class DiskStore:
         return self.root / ("data" if kind == "data" else "files") / key[:2] / key
 
     def _content_path(self, sha256: str) -> Path:
-        return Path(self._content_name(sha256))
-
-    def _content_name(self, sha256: str) -> str:
-        """Return a content's path as text: a variant asks for some thirty, and a Path costs more than the look."""
-        return f"{self._contents}{os.sep}{sha256[:2]}{os.sep}{sha256}"
+        return self.root / "content" / sha256[:2] / sha256
 
 
 def default_root() -> Path:
@@ -278,7 +256,7 @@ def _checksum(kind: str, key: str, payload: bytes) -> bytes:
     return digest(f"{kind} {key}\n".encode() + payload).encode()
 
 
-def _signature(path: str) -> tuple[int, int, int]:
+def _signature(path: Path) -> tuple[int, int, int]:
     stat = os.lstat(path)
     return stat.st_ino, stat.st_size, stat.st_mtime_ns
 
