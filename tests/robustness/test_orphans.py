@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from process_trees import below, left
+from process_trees import below, left, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -33,8 +33,8 @@ def test_a_command_leaves_no_process(started, end, tmp_path):
     check_nothing_is_left(*started(tmp_path), end)
 
 
-def check_nothing_is_left(words, workers, end):
-    """Check that a command with so many workers ends by a signal, and they with it."""
+def check_nothing_is_left(words, workers, end, begun=lambda: True):
+    """Check that a command with so many workers, whose work has `begun`, ends by a signal, and they with it."""
     command = [sys.executable, "-m", "unitcad", *map(str, words)]
     unbuffered = {**os.environ, "PYTHONUNBUFFERED": "1", "UNITCAD_TRACEBACK": ""}
     process = subprocess.Popen(
@@ -42,6 +42,7 @@ def check_nothing_is_left(words, workers, end):
     )
     try:
         others = below(process, workers)
+        until(begun)
         process.send_signal(end)
         _, errors = process.communicate(timeout=30)
         assert left(others) == []

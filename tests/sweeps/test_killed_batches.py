@@ -120,4 +120,5 @@ def test_a_batch_that_is_killed_again_and_again(kills, seed, reference, tmp_path
 def test_a_batch_leaves_no_process(end, tmp_path):
     sweep = ring_sweep(tmp_path / "s", "slow", [float(height) for height in range(2, 20)])
     words = ["batch", sweep, "-o", tmp_path / "out", "-j", 2, "--cache", tmp_path / "cache", "--only", "unit"]
-    check_nothing_is_left(words, 2, end)
+    # msgspec drops a KeyboardInterrupt that comes while it takes a type for the first time.
+    check_nothing_is_left(words, 2, end, begun=(tmp_path / "s" / "calls").exists)
