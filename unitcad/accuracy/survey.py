@@ -208,7 +208,7 @@ def _medium(job: Job) -> list[dict[str, Any]]:
     rows = []
 
     def response_to(rtol: float) -> Response:
-        return one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol)
+        return one.medium.response(one.load, one.omega, one.r, rtol=rtol)
 
     try:
         reference = response_to(REFERENCE)

@@ -25,7 +25,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.special import factorial2
 
-from unitcad.attenuation.layered.loads import Load, bessel_bounds, bessels
+from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, bessels
 from unitcad.attenuation.layered.propagation import Array, Material
 
 PHASE = 8.0 * np.pi
@@ -262,7 +262,7 @@ class Seen(Protocol):
     """A load, seen at radii r (m), shape (n,)."""
 
     @property
-    def load(self) -> Load: ...
+    def load(self) -> UniformDisc: ...
 
     @property
     def r(self) -> np.ndarray: ...
@@ -367,7 +367,7 @@ def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
 
 
 def _span(seen: Seen) -> float:
-    return float(seen.r.max()) + seen.load.reach
+    return float(seen.r.max()) + seen.load.radius
 
 
 def _integrated(
