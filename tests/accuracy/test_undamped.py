@@ -43,3 +43,14 @@ def test_branch_points_of_a_half_space_take_few_wavenumbers(nu):
     found = medium.response(UniformDisc(3.5e-3, "tangential"), 785.0, R, rtol=1e-9)
     assert found.error <= 1e-9 * np.max(np.abs(found.u_r))
     assert found.wavenumbers < 30_000
+
+
+@pytest.mark.parametrize("seed", [2, 26, 28, 35, 41, 58])
+def test_no_wavenumber_is_rounded_to_a_branch_point(seed):
+    """There horizontal shear's compliance is infinite: no finite answer at rtol 1e-11, for one medium in ten."""
+    one = trial("undamped", seed)
+    load = UniformDisc(3e-3, "tangential")
+    fine, coarse = (one.medium.response(load, one.omega, one.r, rtol=rtol) for rtol in (1e-11, 1e-9))
+    assert fine.error <= 2e-11 * fine.largest
+    (u, error), (other, other_error) = (_components(found) for found in (fine, coarse))
+    assert np.all(np.abs(u - other) <= error + other_error)

@@ -50,6 +50,12 @@ class Material:
     eps: float
     ks2: complex
 
+    @property
+    def branch_points(self) -> tuple[complex, complex]:
+        """Wavenumbers (1/m) of the two waves, k_p and k_s: next to them a vertical rate is a square root."""
+        ks = np.sqrt(self.ks2)
+        return np.sqrt(self.eps) * ks, ks
+
 
 @dataclass(frozen=True)
 class Waves:
@@ -91,8 +97,7 @@ def decaying_root(squared: Array) -> Array:
 
 def vertical_rates(material: Material, k: Array) -> tuple[Array, Array]:
     """Return vertical rates g_p and g_s (1/m), factored so that they keep their digits next to the branch points."""
-    ks = np.sqrt(material.ks2)
-    kp = np.sqrt(material.eps) * ks
+    kp, ks = material.branch_points
     return decaying_root((k - kp) * (k + kp)), decaying_root((k - ks) * (k + ks))
 
 
