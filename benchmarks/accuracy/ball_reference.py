@@ -11,13 +11,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from scipy import special
 
 from benchmarks.accuracy.ball_kernel import Kernel, TooHard
-from unitcad.attenuation.layered import LayeredMedium, Load, LossFactor, Point
+from unitcad.attenuation.layered import LayeredMedium, LossFactor, UniformDisc
 
 _DEGREE = 24
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_DEGREE)
@@ -43,18 +42,18 @@ class Reference:
     wavenumbers: int
 
 
-def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: float = 0.0) -> Reference:
-    """Return the displacement (m per pascal or newton) at radii r and depth z (m); r > 0 under a surface point load.
+def response(medium: LayeredMedium, load: UniformDisc, omega: float, r: np.ndarray) -> Reference:
+    """Return the displacement (m per pascal) at radii r (m).
 
     Raises UnitcadError without python-flint, TooHard where it takes too many points.
     """
     r = np.asarray(r, dtype=float)
-    kernel = Kernel(medium, omega, z, load)
+    kernel = Kernel(medium, omega, load)
     if omega == 0.0 or kernel.least_loss >= _LEAST_LOSS:
         u, doubt = _along(kernel, load, r)
         return Reference(u, doubt, kernel.count)
-    losses = _LOSSES * 1e-3 / max(1.0, kernel.slowest * (float(r.max()) + load.reach))
-    kernels = [Kernel(_with_loss(medium, float(loss)), omega, z, load) for loss in losses]
+    losses = _LOSSES * 1e-3 / max(1.0, kernel.slowest * (float(r.max()) + load.radius))
+    kernels = [Kernel(_with_loss(medium, float(loss)), omega, load) for loss in losses]
     values, doubts = zip(*(_along(one, load, r) for one in kernels), strict=True)
     weights, fewer = _weights_at_0(losses), np.append(_weights_at_0(losses[:-1]), 0.0)
     u = np.tensordot(weights, values, 1)
@@ -75,19 +74,15 @@ def _weights_at_0(x: np.ndarray) -> np.ndarray:
     return np.array([np.prod([other / (other - one) for other in x if other != one]) for one in x])
 
 
-def _along(kernel: Kernel, load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _along(kernel: Kernel, load: UniformDisc, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrate along the real axis; return the integral and its doubt."""
-    rows = 3 if kernel.sideways else 2
-    total, taken = np.zeros((rows, r.size), dtype=complex), np.zeros(rows, dtype=complex)
-    if kernel.z == 0:
-        taken = kernel.static
-        total = _static(kernel, load, r)
+    taken, total = kernel.static, _static(kernel, load, r).astype(complex)
     doubt = 1e-15 * np.abs(total)
-    end = 3.0 * kernel.slowest or 0.1 / (float(r.max()) + load.reach)
+    end = 3.0 * kernel.slowest or 0.1 / (float(r.max()) + load.radius)
     corners = np.concatenate([[0.0], end * 2.0 ** np.arange(-6.0, 1.0)])
     scale, spent = float(np.max(np.abs(total))), 0
     while True:
-        span = float(r.max()) + load.reach
+        span = float(r.max()) + load.radius
         spent += int(abs(corners[-1] - corners[0]) * span * 3)
         part, off, scale = _panels(kernel, load, r, corners, taken, scale, total)
         total, doubt = total + part, doubt + off
@@ -99,24 +94,22 @@ def _along(kernel: Kernel, load: Load, r: np.ndarray) -> tuple[np.ndarray, np.nd
         corners = np.array([at, 2.0 * at])
 
 
-def _tail(load: Load, k: float, r: np.ndarray) -> np.ndarray:
+def _tail(load: UniformDisc, k: float, r: np.ndarray) -> np.ndarray:
     """Bound what lies beyond k, over |kernel| there, for a kernel that falls as 1/k^2.
 
     By envelopes, and by parts where they oscillate.
     """
     wave = np.minimum(1.0, 1.0 / np.sqrt(np.maximum(k * r, 1e-300)))
-    return _size(load, k) * wave * np.minimum(k, 4.0 / np.maximum(np.abs(r - load.reach), 1e-300))
+    return _size(load, k) * wave * np.minimum(k, 4.0 / np.maximum(np.abs(r - load.radius), 1e-300))
 
 
-def _size(load: Load, k: float) -> float:
-    if isinstance(load, Point):
-        return 1.0 / (2.0 * math.pi)
+def _size(load: UniformDisc, k: float) -> float:
     return load.radius**2 * min(0.5, (k * load.radius) ** -1.5)
 
 
 def _panels(
     kernel: Kernel,
-    load: Load,
+    load: UniformDisc,
     r: np.ndarray,
     corners: np.ndarray,
     taken: np.ndarray,
@@ -157,9 +150,11 @@ def _panels(
     return total, doubt, scale
 
 
-def _dense(kernel: Kernel, load: Load, r: np.ndarray, a: float, b: float, coefficients: np.ndarray) -> np.ndarray:
+def _dense(
+    kernel: Kernel, load: UniformDisc, r: np.ndarray, a: float, b: float, coefficients: np.ndarray
+) -> np.ndarray:
     """Integrate the kernel's polynomial times transform and Bessel functions from a to b."""
-    pieces = max(1, math.ceil(abs(b - a) * (float(r.max()) + load.reach) / _PIECE))
+    pieces = max(1, math.ceil(abs(b - a) * (float(r.max()) + load.radius) / _PIECE))
     out: np.ndarray = np.zeros((coefficients.shape[1], r.size), dtype=complex)
     step = max(1, 2_000_000 // (32 * r.size))
     for first in range(0, pieces, step):
@@ -168,7 +163,7 @@ def _dense(kernel: Kernel, load: Load, r: np.ndarray, a: float, b: float, coeffi
         values = np.polynomial.legendre.legval(t, coefficients)
         k = (a + b) / 2 + (b - a) / 2 * t
         weight = (b - a) / 2 / pieces * np.tile(_DENSE_WEIGHTS, index.size)
-        weighted, x = values * _transform(load, k) * weight, k[:, None] * r
+        weighted, x = values * load.radius * special.j1(k * load.radius) / k * weight, k[:, None] * r
         if not kernel.sideways:
             out += np.stack([weighted[0] @ special.j1(x), weighted[1] @ special.j0(x)])
             continue
@@ -179,29 +174,12 @@ def _dense(kernel: Kernel, load: Load, r: np.ndarray, a: float, b: float, coeffi
     return out
 
 
-def _transform(load: Load, k: np.ndarray) -> np.ndarray:
-    """Integrate the load times J(kr) r dr."""
-    if isinstance(load, Point):
-        return np.full(k.shape, 1.0 / (2.0 * math.pi))
-    a, x = load.radius, k * load.radius
-    if load.direction != "radial":
-        return a * special.j1(x) / k
-    far = np.maximum(x, 8.0)
-    struve = np.pi / 2 * (special.j1(far) * special.struve(0, far) - special.j0(far) * special.struve(1, far)) / far
-    near = (x <= 8.0) | ~np.isfinite(struve)  # scipy's struve(0, x) has a gap at 25.765
-    if near.any():
-        nodes, weights = np.polynomial.legendre.leggauss(64)
-        t = (nodes + 1) / 2
-        struve[near] = special.j1(x[near, None] * t) @ (weights / 2 * t)
-    return a * a * struve
-
-
 def _mixed(kernel: Kernel, last: np.ndarray) -> np.ndarray:
     """Return what of the kernel's rows can meet in each component."""
     return np.array([last[0] + last[1], last[0] + last[1], last[2]]) if kernel.sideways else last
 
 
-def _static(kernel: Kernel, load: Load, r: np.ndarray) -> np.ndarray:
+def _static(kernel: Kernel, load: UniformDisc, r: np.ndarray) -> np.ndarray:
     """Return the static half-space's displacement by hypergeometric functions, shape (components, n)."""
     zeroth, first, second = _static_orders(load, r)
     if kernel.sideways:
@@ -211,14 +189,9 @@ def _static(kernel: Kernel, load: Load, r: np.ndarray) -> np.ndarray:
     return kernel.static[:, None] * np.array([first, zeroth])
 
 
-def _static_orders(load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Integrate q(k) J_n(kr) dk for n = 0, 1 and 2 (0 for a radial load, which does not need it)."""
-    if isinstance(load, Point):
-        integral = 1.0 / (2 * np.pi * r)
-        return integral, integral, integral
+def _static_orders(load: UniformDisc, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Integrate q(k) J_n(kr) dk for n = 0, 1 and 2."""
     a, s = load.radius, r / load.radius
-    if load.direction == "radial":
-        return np.where(s < 1, a * (1.0 - s), 0.0), a * np.array([_radial(float(one)) for one in s]), 0.0 * s
     low, high = np.minimum(s, 1.0), np.maximum(s, 1.0)
     inside = special.hyp2f1(0.5, -0.5, 1.0, low**2)
     outside = special.hyp2f1(0.5, 0.5, 2.0, high**-2.0) / (2.0 * high)
@@ -226,22 +199,3 @@ def _static_orders(load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     inside = low**2 / 8.0 * special.hyp2f1(0.5, 1.5, 3.0, low**2)
     outside = special.hyp2f1(1.5, -0.5, 2.0, high**-2.0) / (2.0 * high)
     return a * zeroth, a * first, a * np.where(s <= 1, inside, outside)
-
-
-def _radial(s: float) -> float:
-    """Integrate the radial disc of radius 1 over rings of radius x.
-
-    Each ring gives 2 (K - E)(m) / (pi min(s, x)), m = (min / max)^2.
-    """
-    import mpmath as mp
-
-    with mp.workdps(40):
-
-        def ring(x: Any) -> Any:
-            low, high = (x, s) if x < s else (s, x)
-            m = (low / high) ** 2
-            return mp.mpf(0) if m == 1 or m == 0 else 2 * (mp.ellipk(m) - mp.ellipe(m)) / (mp.pi * low) * x
-
-        cuts = sorted({mp.mpf(0), mp.mpf(1), *([mp.mpf(s)] if 0 < s < 1 else [])})
-        integral: Any = mp.quad(ring, cuts) if s > 0 else 0.0
-        return float(integral)

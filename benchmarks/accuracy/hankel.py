@@ -104,7 +104,7 @@ def cases() -> list[Case]:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Solve every case by every method, and measure what responses of every load cost."""
+    """Solve every case by every method, and measure what responses of either load cost."""
     tables, plots, promises = [], [], []
     closest: list[tuple[float, str]] = []
     ends: dict[str, list[tuple[str, float, float]]] = {}
@@ -152,11 +152,7 @@ def run(quick: bool, say: Say) -> Result:
     loads = hankel_cost.every_load(cases()[0].medium, RADII[::4] if quick else RADII, quick, say)
     counts = [] if quick else hankel_cost.counted(cases()[0].medium, say)
     closest += [
-        (
-            cost.over_bound,
-            f"{cost.load}, depth {1e3 * cost.z:g} mm: error {cost.over_bound:.2f} of its bound",
-        )
-        for cost in (*loads, *counts)
+        (cost.over_bound, f"disc, {cost.load}: error {cost.over_bound:.2f} of its bound") for cost in (*loads, *counts)
     ]
     return Result(
         suite="hankel",

@@ -9,7 +9,6 @@ from benchmarks.accuracy.extreme_responses import Row, promises, rows
 from benchmarks.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered import Point, UniformDisc
 from unitcad.errors import UnitcadError
 
 pytest.importorskip("flint")
@@ -27,7 +26,7 @@ def test_a_complex_modes_pole_below_the_path():
         ],
         HalfSpace(1577.8305940170262, 14700304.505067958, 0.45),
     )
-    (response,) = rows([Trial("complex mode", "extreme", medium, DISC, 456.47726234772875, RADII, 0.0)], (1e-6,))
+    (response,) = rows([Trial("complex mode", "extreme", medium, DISC, 456.47726234772875, RADII)], (1e-6,))
     assert response.decided
     assert response.met
     assert response.over_bound <= 1
@@ -35,18 +34,10 @@ def test_a_complex_modes_pole_below_the_path():
 
 def test_the_media_have_every_class_and_load_the_same_from_their_seed():
     media = [trial(kind, seed) for kind in CLASSES for seed in range(6)]
-    assert {(type(one.load), one.load.direction) for one in media} == {
-        (shape, direction) for shape in (Point, UniformDisc) for direction in ("normal", "radial", "tangential")
-    }
-    assert any(one.z > 0 for one in media)
+    assert {one.load.direction for one in media} == {"normal", "tangential"}
     for one in media[::7]:
         again = trial(one.kind, int(one.name.split()[-1]))
-        assert (one.medium.layers, one.load, one.omega, one.z) == (
-            again.medium.layers,
-            again.load,
-            again.omega,
-            again.z,
-        )
+        assert (one.medium.layers, one.load, one.omega) == (again.medium.layers, again.load, again.omega)
         assert np.array_equal(one.r, again.r)
 
 

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import special
 
-from unitcad.attenuation import HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor, Point
+from unitcad.attenuation import HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.attenuation.layered.loads import bessel_bounds, bessels
 
 NU, E = 0.3, 3e4
@@ -23,43 +23,46 @@ FOREARM = LayeredMedium(
 )
 
 
-def _cerruti(x, y, z):
+A = 3.5e-3
+
+
+def _cerruti(x, y):
     """Displacement (x, y, z) under a newton in x at the origin of the surface (Johnson, Contact Mechanics, 3.75)."""
-    far, part = np.sqrt(x * x + y * y + z * z), 1 - 2 * NU
-    below = far + z
-    u_x = 1 / far + x**2 / far**3 + part * (1 / below - x**2 / (far * below**2))
-    u_y = x * y / far**3 - part * x * y / (far * below**2)
-    u_z = x * z / far**3 + part * x / (far * below)
+    far, part = np.hypot(x, y), 1 - 2 * NU
+    u_x = (1 + part) / far + (1 - part) * x**2 / far**3
+    u_y = (1 - part) * x * y / far**3
+    u_z = part * x / far**2
     return np.array([u_x, u_y, u_z]) / (4 * np.pi * MU)
 
 
-@pytest.mark.parametrize("z", [0.0, 5e-4, 2e-3, 1e-2])
-def test_a_point_force_is_cerrutis(z):
-    r = np.array([1e-3, 5e-3, 2e-2])
-    response = BODY.response(Point("tangential"), 0.0, r, z=z, rtol=1e-9)
-    ahead, beside = _cerruti(r, 0 * r, z), _cerruti(0 * r, r, z)
+def _on_a_disc(x, y):
+    """The same under a pascal on a disc: beyond its edge, by Gauss over the radius and even steps around."""
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    rho, turn = A * (nodes + 1) / 2, np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    at = [part[..., None, None] - rho[:, None] * of(turn) for part, of in ((x, np.cos), (y, np.sin))]
+    return _cerruti(*at).mean(axis=-1) @ (weights * np.pi * A * rho)
+
+
+def test_a_traction_sideways_is_cerrutis():
+    r = np.array([5e-3, 9e-3, 2e-2])
+    response = BODY.response(UniformDisc(A, "tangential"), 0.0, r, rtol=1e-9)
+    ahead, beside = _on_a_disc(r, 0 * r), _on_a_disc(0 * r, r)
     for value, exact in ((response.u_r, ahead[0]), (-response.u_theta, beside[0]), (response.u_z, ahead[2])):
         assert np.max(np.abs(value - exact)) <= response.error
     assert response.error < 1e-9 * np.max(np.abs(ahead))
 
 
-@pytest.mark.parametrize("z", [0.0, 3e-3])
 @pytest.mark.parametrize("hertz", [0, 50, 125, 250])
-def test_a_sideways_force_and_a_normal_one_are_reciprocal(hertz, z):
-    """Betti: at the surface a force in x lifts the skin at r by what a force at r in z moves the origin in x."""
+def test_a_sideways_force_and_a_normal_one_are_reciprocal(hertz):
+    """Betti: a force in x lifts the skin at r by what a force at r in z moves the origin in x."""
     r = np.linspace(7e-3, 37e-3, 5)
-    sideways = FOREARM.response(Point("tangential"), 2 * np.pi * hertz, r, rtol=1e-8)
-    normal = FOREARM.response(Point(), 2 * np.pi * hertz, r, rtol=1e-8)
+    sideways = FOREARM.response(UniformDisc(A, "tangential"), 2 * np.pi * hertz, r, rtol=1e-8)
+    normal = FOREARM.response(UniformDisc(A), 2 * np.pi * hertz, r, rtol=1e-8)
     assert np.all(np.abs(sideways.u_z + normal.u_r) <= sideways.error_z + normal.error_r)
-    deep = FOREARM.response(Point("tangential"), 2 * np.pi * hertz, r, z=z, rtol=1e-4)
-    fine = FOREARM.response(Point("tangential"), 2 * np.pi * hertz, r, z=z, rtol=1e-9)
-    for name in ("r", "theta", "z"):
-        wrong = np.abs(getattr(deep, f"u_{name}") - getattr(fine, f"u_{name}"))
-        assert np.all(wrong <= getattr(deep, f"error_{name}") + getattr(fine, f"error_{name}"))
 
 
 def _layers_in_mpmath(layers, base, k, omega):
-    """SH compliance at the surface and at the last interface by Thomson and Haskell's matrices, in 60 digits."""
+    """SH compliance at the surface by Thomson and Haskell's matrices, in 60 digits."""
 
     def material(body):
         mu = mp.mpf(body.youngs_modulus) / (2 * (1 + mp.mpf(body.poisson_ratio))) * mp.mpc(1, body.damping.tan_delta)
@@ -71,7 +74,7 @@ def _layers_in_mpmath(layers, base, k, omega):
         mu, rate = material(layer)
         cosh, sinh = mp.cosh(rate * layer.thickness), mp.sinh(rate * layer.thickness)
         u, t = cosh * u + sinh / (mu * rate) * t, mu * rate * sinh * u + cosh * t
-    return u / t, 1 / t
+    return u / t
 
 
 @settings(deadline=None, max_examples=60)
@@ -91,12 +94,11 @@ def test_horizontal_shear_at_every_contrast(data):
     medium = LayeredMedium(layers, base)
     phase = 1 + sum(_phase(layer, k, omega) for layer in layers)
     assume(phase < 2000)
-    for depth, which in ((0.0, 0), (sum(layer.thickness for layer in layers), 1)):
-        ours = medium.shear_transfer(np.array([k], dtype=complex), omega, depth)[0]
-        with mp.workdps(60 + int(phase)):
-            exact = _layers_in_mpmath(layers, base, k, omega)[which]
-            wrong = abs(mp.mpc(complex(ours)) - exact)
-        assert wrong <= 4e-15 * phase / 1e-3 * abs(exact) + 1e-300
+    ours = medium.shear_column(np.array([k], dtype=complex), omega)[0]
+    with mp.workdps(60 + int(phase)):
+        exact = _layers_in_mpmath(layers, base, k, omega)
+        wrong = abs(mp.mpc(complex(ours)) - exact)
+    assert wrong <= 4e-15 * phase / 1e-3 * abs(exact) + 1e-300
 
 
 def _phase(layer, k, omega):

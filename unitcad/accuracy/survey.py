@@ -19,7 +19,6 @@ from typing import Any, TypeVar
 from unitcad.accuracy.measurements import REFERENCE, RTOLS, compare
 from unitcad.accuracy.random_media import CLASSES, trial
 from unitcad.accuracy.random_specs import RANGES, seeded_spec
-from unitcad.attenuation.layered import Response
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.moulds.plan import plan
 from unitcad.pipeline.write import build
@@ -204,30 +203,18 @@ def survey_media(count: int, seed: int, say: Say) -> dict[str, Any]:
 
 def _medium(job: Job) -> list[dict[str, Any]]:
     """Return a row for each rtol; a response without a value is infinitely far off. Runs in a worker process."""
-    one = trial(*job)
-    rows = []
-
-    def response_to(rtol: float) -> Response:
-        return one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol)
-
-    try:
-        reference = response_to(REFERENCE)
-    except UnitcadError:  # two of 300 undamped media have no finite answer there
-        reference = response_to(10 * REFERENCE)
-    for rtol in RTOLS:
+    one, rows = trial(*job), _lost(job)
+    reference = one.medium.response(one.load, one.omega, one.r, rtol=REFERENCE)
+    for row in rows:
         start = time.process_time()
-        response = response_to(rtol)
-        seconds = time.process_time() - start
-        rows.append({**_row(job, rtol), **asdict(compare(response, reference)), "s": seconds})
+        response = one.medium.response(one.load, one.omega, one.r, rtol=row["rtol"])
+        row |= {"s": time.process_time() - start, **asdict(compare(response, reference))}
     return rows
 
 
-def _row(job: Job, rtol: float) -> dict[str, Any]:
-    return {"class": job[0], "seed": job[1], "rtol": rtol}
-
-
 def _lost(job: Job) -> list[dict[str, Any]]:
-    return [{**_row(job, rtol), **dict.fromkeys(("error", "bound", "over_bound", "s"), math.inf)} for rtol in RTOLS]
+    lost = dict.fromkeys(("error", "bound", "over_bound", "s"), math.inf)
+    return [{"class": job[0], "seed": job[1], "rtol": rtol, **lost} for rtol in RTOLS]
 
 
 def _summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:

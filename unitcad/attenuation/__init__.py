@@ -22,9 +22,7 @@ from unitcad.attenuation.layered import (
     KelvinVoigt,
     Layer,
     LayeredMedium,
-    Load,
     LossFactor,
-    Point,
     Response,
     UniformDisc,
 )
@@ -36,9 +34,7 @@ __all__ = [
     "KelvinVoigt",
     "Layer",
     "LayeredMedium",
-    "Load",
     "LossFactor",
-    "Point",
     "Response",
     "UniformDisc",
 ]

@@ -24,7 +24,7 @@ if __name__ == "__main__":
     values = []
     for kind, seed in MEDIA:
         one = trial(kind, seed)
-        exact = response(one.medium, one.load, one.omega, one.r, one.z)
+        exact = response(one.medium, one.load, one.omega, one.r)
         u = [[[value.real, value.imag] for value in row] for row in exact.u]
         values.append({"kind": kind, "seed": seed, "u": u, "doubt": exact.doubt.tolist()})
     Path(__file__).with_name("undamped.json").write_text(json.dumps(values, indent=1) + "\n")

@@ -12,14 +12,6 @@ from typing import Any, Literal
 import numpy as np
 
 Wave = Literal["p", "s"]
-Reading = Literal["loss_modulus", "kelvin_voigt", "literal"]
-READINGS: dict[Reading, str] = {
-    "loss_modulus": "eta is a loss modulus E tan(delta) in Pa, which makes the exponent a number: the rate is twice "
-    "the amplitude's true decay",
-    "kelvin_voigt": "eta is a viscosity E tan(delta)/omega in Pa s and a factor omega/2 is missing: "
-    "omega^2 eta d/(2 E c), the true decay at low loss",
-    "literal": "eta is a viscosity in Pa s and the exponent is taken as printed: its unit is a second, not a number",
-}
 AIR_IMPEDANCE: dict[str, float] = {"p": 1.204 * 343.0, "s": 0.0}  # Pa s/m at 20 degC; air carries no shear wave
 
 
@@ -100,21 +92,22 @@ def transmissions(units: Units, wave: Wave = "s") -> Any:
     return transmission(z[..., :-1], z[..., 1:])
 
 
-def exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
-    """Return omega eta d/(E v) of each layer, equation 5, shape (..., N), by one of the `READINGS` of eta."""
+def exponents(units: Units, wave: Wave = "s") -> Any:
+    """Return omega eta d/(E v) of each layer, equation 5, shape (..., N); eta is a loss modulus E tan(delta) in Pa.
+
+    That makes it a number. Its rate is twice the amplitude's true decay.
+    """
     speed = wave_speed(units.youngs_modulus, units.density, units.poisson_ratio, wave)
-    omega = units.omega[..., None]
-    loss_rate = omega * units.tan_delta * units.thickness / speed
-    return loss_rate * {"loss_modulus": 1.0, "kelvin_voigt": 0.5, "literal": 1.0 / omega}[reading]
+    return units.omega[..., None] * units.tan_delta * units.thickness / speed
 
 
-def published_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
+def published_path(units: Units, wave: Wave = "s") -> Any:
     """Return equation 5's product of k_t and exponentials along the walls, shape (...).
 
     f1, f2 and the skin's part cancel.
     """
     with _quiet():
-        return np.prod(transmissions(units, wave), axis=-1) * np.exp(-np.sum(exponents(units, wave, reading), axis=-1))
+        return np.prod(transmissions(units, wave), axis=-1) * np.exp(-np.sum(exponents(units, wave), axis=-1))
 
 
 def corrected_path(units: Units, wave: Wave = "s") -> Any:
@@ -191,7 +184,7 @@ def constraints(units: Units, control: Units) -> list[Constraint]:
         inequalities.append(Constraint(f"5{name}", text, "<", *paths, "1"))
     for name, wave in waves:
         text = f"attenuation of {wave.upper()} waves: unit above control"
-        left, right = (np.sum(exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control))
+        left, right = (np.sum(exponents(u, wave), axis=-1) / u.omega**2 for u in (units, control))
         inequalities.append(Constraint(f"6{name}", text, ">", left, right, "s2"))
     growth: list[tuple[str, Wave]] = [("6c", "p"), ("6d", "s")]
     for name, wave in growth:

@@ -7,7 +7,7 @@ higher motor lifts caps and circuit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -176,10 +176,6 @@ def _pad_thickness(pad: Pad, variant: EstimateInput, factor: float) -> EstimateI
 _MOST_CORNERS = 12
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
-_OF_WAVES: dict[str, Callable[[Units, cf.Wave], Any]] = {
-    "published": cf.published_path,
-    "corrected": cf.corrected_path,
-}
 KINDS = {
     "rule": "two constants fitted to the measured levels: s, times q for each pass of a border whose inside is the "
     "softer layer. It reads which side is softer and, below the least measured ratio of moduli, an assumed line in the "
@@ -316,33 +312,27 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
 
     With a lab's `fit` the constants are its own, and the level has a predictive range.
     """
-    constants = _constants(variant, model, fit)
-
-    def level(units: Units, wave: cf.Wave) -> Any:
-        return constants["s"] * _OF_WAVES[model](units, wave) if wave == "p" else edge_levels(units, model, constants)
-
-    units = corners(variant)
-    own: dict[cf.Wave, Any] = {wave: level(units, wave) for wave in (_WAVES if model in _OF_WAVES else _WAVES[:1])}
-    edge = spread(variant, own["s"])
-    block: dict[str, Any] = {"kind": KINDS[model], "edge_level": {**edge, "unit": "of the motor's amplitude"}}
+    units, constants = corners(variant), _constants(variant, model, fit)
+    own = edge_levels(units, model, constants)
+    edge = {**spread(variant, own), "unit": "of the motor's amplitude"}
+    block: dict[str, Any] = {"kind": KINDS[model], "edge_level": edge}
     if fit:
         block["predictive"] = predictive_block(fit, model, variant, unknown(variant))
     if variant.amplitude is not None:
-        block["edge_amplitude_um"] = spread(variant, variant.amplitude * 1e6 * own["s"])
+        block["edge_amplitude_um"] = spread(variant, variant.amplitude * 1e6 * own)
     by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
     block["constants"] = {**constants, "made_by": by_fit or "least squares of the log of nine measured levels"}
-    controls = _controls(variant)
+    # A control for each distinct material, by the number of its first layer.
+    names = [layer.material for layer in variant.layers]
+    controls = [names.index(name) for name in dict.fromkeys(names)] if len(names) > 1 else []
     block["hierarchical_over_control"] = [
-        {"control": variant.layers[index].material, **ratios.pop("s"), **({"wave": "s"} if ratios else {}), **ratios}
-        for index in controls
-        for ratios in [{wave: spread(variant, one / level(units.control(index), wave)) for wave, one in own.items()}]
+        {"control": names[i], **spread(variant, own / edge_levels(units.control(i), model, constants))}
+        for i in controls
     ] or None
     if not controls:
         block["hierarchical_over_control_reason"] = "a single layer is its own control"
     if model == "published":
         block |= _published_details(variant, controls)
-    if model == "corrected":
-        block["wave_of_the_level"] = "s"
     block["sensitivities"] = test_slopes(
         variant, sensitivities(variant, lambda changed: edge_levels(stack_inputs(changed), model, constants))
     )
@@ -369,19 +359,11 @@ def test_slopes(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
     return {**seen, "tested": rows}
 
 
-def _controls(variant: EstimateInput) -> list[int]:
-    """Return a layer's index for each distinct material, if the unit has more than one layer."""
-    if len(variant.layers) == 1:
-        return []
-    names = [layer.material for layer in variant.layers]
-    return [names.index(name) for name in dict.fromkeys(names)]
-
-
 def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:
+    """Return the coefficients of equation 4 and inequalities 5 and 6: 5, 6a and 6b for each control; 6c and 6d once."""
     if unknown(variant):
-        return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
+        return {"constraints": None}
     units = corners(variant) if range_notes(variant) else nominal(variant)
-    alone = {i: units.control(i) for i in controls}
     coefficients = {}
     for wave in _WAVES:
         z = cf.with_air(cf.impedances(units, wave), wave)
@@ -390,49 +372,18 @@ def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str,
             **_by_corner("k_r", cf.reflection(z[..., :-1], z[..., 1:]), variant),
         }
     return {
-        "wave_of_the_level": "s",
-        "reading_of_eta": "loss_modulus",
-        "poisson_ratio_used": [layer.poisson_ratio.middle for layer in variant.layers],
         "interfaces": [f"Layer {i + 1} to {i + 2}" for i in range(len(variant.layers) - 1)] + ["last layer to air"],
         "coefficients": coefficients,
-        "readings": [_reading(variant, units, reading, alone) for reading in cf.READINGS],
-        "constraints": _constraints(variant, units, alone),
+        "constraints": [
+            _constraint(constraint, None if constraint.name in _NO_CONTROL else variant.layers[i].material, variant)
+            for i in controls
+            for constraint in cf.constraints(units, units.control(i))
+            if i == controls[0] or constraint.name not in _NO_CONTROL
+        ],
     }
 
 
 _NO_CONTROL = ("6c", "6d")
-
-
-def _constraints(variant: EstimateInput, units: Units, controls: Mapping[int, Units]) -> list[dict[str, Any]]:
-    """Return 5, 6a and 6b for each control; 6c and 6d, which need no control, once."""
-    first = next(iter(controls), None)
-    return [
-        _constraint(constraint, None if constraint.name in _NO_CONTROL else variant.layers[index].material, variant)
-        for index, control in controls.items()
-        for constraint in cf.constraints(units, control)
-        if index == first or constraint.name not in _NO_CONTROL
-    ]
-
-
-def _reading(
-    variant: EstimateInput, units: Units, reading: cf.Reading, controls: Mapping[int, Units]
-) -> dict[str, Any]:
-    """Return the result of one reading of eta for the unit and over its controls."""
-
-    def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
-        own, control = (cf.published_path(one, wave, reading) for one in (units, controls[index]))
-        return _by_corner(wave, own / control, variant)
-
-    exponents = cf.exponents(units, "s", reading)
-    return {
-        "eta": reading,
-        "meaning": cf.READINGS[reading],
-        "unit_of_exponent": "s, which no exponent may have" if reading == "literal" else "1",
-        **_by_corner("exponents_s_wave", exponents, variant),
-        "hierarchical_over_control": [
-            {"control": variant.layers[i].material, **ratio(i, "s"), **ratio(i, "p")} for i in controls
-        ],
-    }
 
 
 def _constraint(constraint: cf.Constraint, control: str | None, variant: EstimateInput) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """A layered half-space under a load: its displacement, with a bound on the error.
 
-An axisymmetric load: u_z(r) = integral of C_zz(k) q(k) J0(kr) k dk, u_r(r) the same with J1. A sideways one, in the
+A normal load: u_z(r) = integral of C_zz(k) q(k) J0(kr) k dk, u_r(r) that of C_rz with J1. A sideways one, in the
 direction theta = 0, with C_sh of horizontally polarised shear (Cerruti's problem on a homogeneous half-space):
 u_r = cos(theta) (A - B), u_theta = -sin(theta) (A + B), u_z = -cos(theta) Z, where A is the integral of
 (C_rr + C_sh) / 2 q(k) J0(kr) k dk, B that of (C_rr - C_sh) / 2 with J2, Z that of C_zr with J1.
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.layered.integral import Integrals, Problem, integrate, overflow
-from unitcad.attenuation.layered.loads import Direction, Load, Point, UniformDisc
+from unitcad.attenuation.layered.loads import Direction, UniformDisc
 from unitcad.attenuation.layered.medium import (
     LEAST,
     MOST,
@@ -55,9 +55,7 @@ __all__ = [
     "KelvinVoigt",
     "Layer",
     "LayeredMedium",
-    "Load",
     "LossFactor",
-    "Point",
     "Response",
     "UniformDisc",
     "complex_shear_modulus",
@@ -77,12 +75,12 @@ class Response:
     """The displacement of a medium under a load, with a bound of its error.
 
     Under a tangential load in the direction theta = 0, multiply u_r and u_z by cos(theta) and u_theta by sin(theta). A
-    rotating force gives the same amplitudes at every theta. For other loads u_theta is 0.
+    rotating force gives the same amplitudes at every theta. Under a normal load u_theta is 0.
 
     Attributes
     ----------
     u_r, u_theta, u_z : complex array
-        Displacement, m per pascal (disc) or per newton (point), in the shape of r.
+        Displacement, m per pascal, in the shape of r.
     error_r, error_theta, error_z : float array
         Bound of the error of each value, in the same unit and shape.
     wavenumbers : int
@@ -120,7 +118,7 @@ class Response:
         return float(max(np.max(np.abs(u)) for u in (self.u_r, self.u_theta, self.u_z)))
 
 
-def _of_rows(load: Load, rows: Array, errors: np.ndarray, wavenumbers: int) -> Response:
+def _of_rows(load: UniformDisc, rows: Array, errors: np.ndarray, wavenumbers: int) -> Response:
     """Return the response of which these are the integrals, shape (rows, ...)."""
     if load.direction == "tangential":
         (a, b, c), (of_a, of_b, of_c) = rows, errors
@@ -179,14 +177,6 @@ def _better(one: Integrals, other: Integrals) -> Integrals:
     return replace(other, total=total, error=error, wavenumbers=one.wavenumbers + other.wavenumbers)
 
 
-def _check_size(end: float, span: float, omega: float) -> None:
-    """Refuse, before anything is allocated, an omega whose waves are too short for the distance `span` (m)."""
-    panels = end * span / PHASE
-    if panels > _MOST_PANELS:
-        limit = f"its waves are too short for {span:g} m: {panels:.2g} panels, the most is {_MOST_PANELS}"
-        raise Refusal("omega", omega, limit, float(f"{0.9 * omega * _MOST_PANELS / panels:.2g}"))
-
-
 class LayeredMedium(Stack):
     """Layers, top first, on a half-space.
 
@@ -216,19 +206,17 @@ class LayeredMedium(Stack):
     True
     """
 
-    def response(self, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
-        """Return the displacement at some radii and a depth under a load.
+    def response(self, load: UniformDisc, omega: float, r: Any, rtol: float = 1e-6) -> Response:
+        """Return the displacement of the surface at some radii under a load.
 
         Parameters
         ----------
-        load : Load
-            A `Point` (per newton) or a `UniformDisc` (per pascal).
+        load : UniformDisc
+            A pressure, or a traction sideways, of one pascal on a disc.
         omega : float
             Angular frequency, rad/s.
         r : float or array
             Radii, m, in any shape.
-        z : float, default 0
-            Depth, m.
         rtol : float, default 1e-6
             Wanted error over the largest |u| of all radii, 1e-12 to 0.1. If it can't be reached, the errors state so.
 
@@ -240,34 +228,35 @@ class LayeredMedium(Stack):
         Raises
         ------
         Refusal
-            For an invalid value, and for r = 0 under a point load at the surface.
+            For an invalid value.
         UnitcadError
             If no finite answer was found.
 
         Examples
         --------
-        >>> from unitcad.attenuation import HalfSpace, LayeredMedium, Point
+        >>> from unitcad.attenuation import HalfSpace, LayeredMedium, UniformDisc
         >>> medium = LayeredMedium([], HalfSpace(1000.0, 3e3, 0.5))
-        >>> static = medium.response(Point(), omega=1e-6, r=1.0)
-        >>> bool(abs(static.u_z.real - 1 / (4 * 3.141592653589793 * 1e3)) < 1e-9)  # 1 / (4 pi mu r)
+        >>> static = medium.response(UniformDisc(5e-3), omega=0.0, r=0.0)
+        >>> bool(abs(static.u_z - 5e-3 / (2 * 1e3)) < 1e-18)  # a / (2 mu), Boussinesq
         True
         """
-        if not isinstance(load, Load):
-            raise Refusal("load", str(load), "must be a Point or a UniformDisc")
-        radii = _radii(r)
-        z, rtol = finite("z", z), finite("rtol", rtol, above=True)
+        if not isinstance(load, UniformDisc):
+            raise Refusal("load", str(load), "must be a UniformDisc")
+        radii, rtol = _radii(r), finite("rtol", rtol, above=True)
         if not 1e-12 <= rtol <= 0.1:
             raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
-        if load.reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
-            raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
         # A layer of no thickness changes nothing, so its waves must not set the path.
         medium, flat = self.without_empty_layers(), radii.ravel()
         end = medium.last_pole(omega)
-        _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
+        span = float(flat.max()) + load.radius
+        panels = end * span / PHASE
+        if panels > _MOST_PANELS:  # before anything is allocated
+            limit = f"its waves are too short for {span:g} m: {panels:.2g} panels, the most is {_MOST_PANELS}"
+            raise Refusal("omega", omega, limit, float(f"{0.9 * omega * _MOST_PANELS / panels:.2g}"))
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
             # Each component is made of at most two rows, and one of them is at least as large as each row.
             sideways = load.direction == "tangential"
-            found = _solve(Problem(medium, omega, load, flat, z), end, rtol / 2.0 if sideways else rtol)
+            found = _solve(Problem(medium, omega, load, flat), end, rtol / 2.0 if sideways else rtol)
         if not (np.isfinite(found.total).all() and np.isfinite(found.error).all()):
             raise overflow(omega)
         total, error = (part.reshape(-1, *radii.shape) for part in (found.total, found.error))

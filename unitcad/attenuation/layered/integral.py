@@ -1,9 +1,9 @@
 """The Hankel integral of a medium's compliance along a path of panels, with a bound on its error.
 
 Composite Gauss-Legendre (`quadrature`); a panel whose last Legendre coefficients have not died is halved towards the
-pole that they show, or goes around it. Each row of the load's kernel meets the Bessel function of its own order. At the
-surface the static half-space of one of the layers, known in closed form, is taken out first. What is left beyond the
-end of the path is bounded by the kernel itself, sampled there.
+pole that they show, or goes around it. Each row of the load's kernel meets the Bessel function of its own order. The
+static half-space of one of the layers, known in closed form, is taken out first. What is left beyond the end of the
+path is bounded by the kernel itself, sampled there.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from unitcad.attenuation.layered.loads import Load, bessel_bounds, static_kernel
+from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, static_kernel
 from unitcad.attenuation.layered.medium import Stack
 from unitcad.attenuation.layered.propagation import Array, Material
 from unitcad.attenuation.layered.quadrature import (
@@ -48,12 +48,12 @@ _SOON = 10.0
 class Tail:
     """bounds[..., i]: the integrals of the kernel's rows from k[i] to infinity are at most that.
 
-    In m per pascal or newton, shape (rows, radii, wavenumbers). reference: the static half-space to be taken out.
+    In m per pascal, shape (rows, radii, wavenumbers). reference: the static half-space to be taken out.
     """
 
     k: np.ndarray
     bounds: np.ndarray
-    reference: Material | None
+    reference: Material
     scale: float  # a first guess of the largest displacement
 
     def start(self, tolerance: float) -> float:
@@ -66,15 +66,13 @@ class Tail:
         return self.bounds[..., self.k.searchsorted(stop, side="right") - 1]
 
 
-def grid(
-    load: Load, r: np.ndarray, z: float, end: float, thinnest: float, affordable: float, rtol: float
-) -> np.ndarray:
+def grid(load: UniformDisc, r: np.ndarray, end: float, thinnest: float, affordable: float, rtol: float) -> np.ndarray:
     """Return the wavenumbers (1/m), from beyond the last pole on, at which the kernel is sampled to bound its tail.
 
     thinnest: thickness of a layer (m); affordable: the last wavenumber to which a path may go. It is one of them where
     they reach beyond it.
     """
-    lengths = [x for x in (load.reach, z, float(r.max())) if x > 0]
+    lengths = [x for x in (load.radius, float(r.max())) if x > 0]
     first = max(1.4 * end, 1e-3 / max(lengths))
     last = max(1e5 * first, 1e5 / min(lengths))
     far = min(max(_FALLING * first, _FALLING / thinnest), 0.1 * last)
@@ -90,26 +88,22 @@ def measure_tail(
     k: np.ndarray,
     raw: Array,
     materials: tuple[Material, ...],
-    load: Load,
+    load: UniformDisc,
     r: np.ndarray,
-    static: np.ndarray | None,
+    static: np.ndarray,
     far: float,
     rtol: float,
     largest: float = np.inf,
 ) -> Tail:
     """Bound the tail by the kernel on its `grid` k; choose the static half-space that leaves the least.
 
-    raw (rows, wavenumbers): the kernel, nothing taken out; static: the load's integrals, shape (rows, radii), None
-    below the surface; far: the last wavenumber (1/m) that can be afforded; largest: displacement, if known. Two bounds,
-    the lower one counts: the envelope of the Bessel functions, and, where the kernel falls off, integration by parts
-    against their oscillation.
+    raw (rows, wavenumbers): the kernel, nothing taken out; static: the load's integrals, shape (rows, radii); far: the
+    last wavenumber (1/m) that can be afforded; largest: displacement, if known. Two bounds, the lower one counts: the
+    envelope of the Bessel functions, and, where the kernel falls off, integration by parts against their oscillation.
     """
     within = max(1, int(k.searchsorted(far, side="right")))
-    if static is None:
-        bounds = _bounds(k, raw, load, r)[..., :within]
-        return Tail(k[:within], bounds, None, min(float(bounds[..., 0].max()), largest))
     # As on a half-space of the compliance at the wavenumber of the load's size: the disc does not rest on a film alone.
-    at = min(int(k.searchsorted(1.0 / max(load.reach, float(r.min())))), k.size - 1)
+    at = min(int(k.searchsorted(1.0 / max(load.radius, float(r.min())))), k.size - 1)
     scale = min(float((np.abs(static).max(axis=1) * np.abs(raw[:, at])).max()), largest)
 
     def tail(material: Material, radii: np.ndarray = r) -> Tail:
@@ -119,10 +113,10 @@ def measure_tail(
     top = tail(materials[0])
     if top.start(rtol * scale) <= _SOON * k[0]:
         return top
-    few = np.array([r.min(), r[np.argmin(np.abs(r - load.reach))], r.max()])
+    few = np.array([r.min(), r[np.argmin(np.abs(r - load.radius))], r.max()])
     choice = [tail(material, few) for material in dict.fromkeys(reversed(materials)) if material.shear != 0]
     best = min(choice, key=lambda one: _left(one, rtol)).reference
-    return top if best in (None, materials[0]) else tail(best)
+    return top if best == materials[0] else tail(best)
 
 
 def _left(tail: Tail, rtol: float) -> tuple[float, float, float]:
@@ -139,7 +133,7 @@ _NONE = 1e250
 """In place of infinity, which times 0 is no number."""
 
 
-def _bounds(k: np.ndarray, kernel: Array, load: Load, r: np.ndarray) -> np.ndarray:
+def _bounds(k: np.ndarray, kernel: Array, load: UniformDisc, r: np.ndarray) -> np.ndarray:
     """Return the bounds from each wavenumber on, shape (rows, radii, wavenumbers), of a kernel (rows, wavenumbers).
 
     By the envelope of the waves, summed by the trapezoidal rule; and by parts, from where the waves oscillate, with
@@ -149,8 +143,8 @@ def _bounds(k: np.ndarray, kernel: Array, load: Load, r: np.ndarray) -> np.ndarr
     envelope = _MARGIN * load.envelope(k) * bessel_bounds(load.orders, phase)
     before = np.concatenate([[0.0], np.diff(k)]) / 2.0
     after = np.concatenate([np.diff(k), [0.0]]) / 2.0
-    distance = np.maximum(np.abs(r - load.reach), 1e-12 * (r + load.reach) + 1e-300)
-    oscillating = (phase > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))
+    distance = np.maximum(np.abs(r - load.radius), 1e-12 * (r + load.radius) + 1e-300)
+    oscillating = (phase > 3.0) & (k * load.radius > 3.0)
     size = np.abs(kernel)
     variation = size.copy()
     variation[:, :-1] += _summed_from_right(np.abs(np.diff(kernel)))
@@ -194,22 +188,21 @@ _WORTH = 0.2
 """Share of the error that another attempt must be able to gain.
 
 A tighter rtol that is not reached then is at most 1.25 times worse than a looser one, but for rare media: one of 2,000
-random ones was 2.5 times worse (`random_media.trial("extreme contrast", 90143)`).
+random ones was 2.5 times worse.
 """
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A medium at omega (rad/s) under a load, seen at radii r (m), shape (n,), and depth z (m).
+    """A medium at omega (rad/s) under a load, seen at radii r (m), shape (n,).
 
-    reference: the static half-space that is taken out, None below the surface.
+    reference: the static half-space that is taken out.
     """
 
     medium: Stack
     omega: float
-    load: Load
+    load: UniformDisc
     r: np.ndarray
-    z: float
     reference: Material | None = None
 
     def kernel(self, k: Array) -> Array:
@@ -218,11 +211,10 @@ class Problem:
         return k * np.concatenate(chunks, axis=1) - self.taken_out[:, None]
 
     def _compliance(self, k: Array) -> Array:
-        way = 1 if self.load.direction == "normal" else 0
-        u_r, u_z = self.medium.transfer([way], k, self.omega, self.z)[:, 0]
-        if self.load.direction != "tangential":
-            return np.array([u_r, u_z])
-        u_theta = self.medium.shear_transfer(k, self.omega, self.z)
+        if self.load.direction == "normal":
+            return self.medium.columns([1], k, self.omega)[:, 0]
+        u_r, u_z = self.medium.columns([0], k, self.omega)[:, 0]
+        u_theta = self.medium.shear_column(k, self.omega)
         return np.array([(u_r + u_theta) / 2.0, (u_r - u_theta) / 2.0, u_z])
 
     @cached_property
@@ -256,17 +248,17 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
 
     |u|: of a row; end: the last pole (1/m).
     """
-    load, r, z = bare.load, bare.r, bare.z
+    load, r = bare.load, bare.r
     materials = bare.medium.materials(bare.omega)
-    span = float(r.max()) + load.reach + 2.0 * z
+    span = float(r.max()) + load.radius
     far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
     thinnest = min((layer.thickness for layer in bare.medium.layers), default=np.inf)
-    beyond = grid(load, r, z, end, thinnest, far, rtol)
+    beyond = grid(load, r, end, thinnest, far, rtol)
     # The tail is not known yet: as far as it is from a disc on skin, and no farther than some panels go.
     aim = min(max(end, PHASE / span / 8.0) * rtol**-0.2, end + _FIRST_PIECES * PHASE / span)
     stop = float(max(aim, beyond[0]))
     pending = from_origin(end, stop, span, materials)
-    static = None if z > 0.0 else load.static(r)
+    static = load.static(r)
     tail = measure_tail(beyond, bare.kernel(beyond + 0j), materials, load, r, static, far, rtol, largest)
     least = float(tail.bounds[..., -1].max())
 
@@ -275,10 +267,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
 
     problem = replace(bare, reference=tail.reference)
     phase = PHASE * min(1.0, (rtol / _PHASE_RTOL) ** (1 / 32))
-    known = rounded = np.zeros((len(load.orders), r.size))
-    if static is not None:
-        known = problem.taken_out[:, None] * static
-        rounded = np.abs(problem.taken_out).max() * load.static_rounding(r)
+    known = problem.taken_out[:, None] * static
+    rounded = np.abs(problem.taken_out).max() * load.static_rounding(r)
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = beyond.size, 0, False, 0.0
@@ -409,7 +399,7 @@ def _detours(
 
     at = np.flatnonzero(clear)
     of = Poles(found.poles.at[at], found.poles.uncertainty[at], found.poles.rest[:, at])
-    turned, corners = around(panels[at], of, 1.0 / span if span > 0 else np.inf, lossier)
+    turned, corners = around(panels[at], of, 1.0 / span, lossier)
     which = np.zeros_like(bad)
     which[at[turned]] = True
     pieces = np.zeros((len(panels), 4, 4), dtype=np.complex128)

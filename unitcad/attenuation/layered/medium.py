@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from numbers import Complex, Real
 from typing import Any
 
@@ -27,10 +26,8 @@ import numpy as np
 from unitcad.attenuation.layered.propagation import (
     Array,
     Material,
-    Plane,
     adjugate,
     det,
-    parameter,
     product,
     raise_plane,
     shear_compliance,
@@ -268,7 +265,7 @@ def _check_material(what: str, material: Layer | HalfSpace, above: bool) -> None
 
 
 class Stack:
-    """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber.
+    """Layers, top first, on a half-space: its compliance, per wavenumber.
 
     Raises `Refusal` for objects other than `Layer` and `HalfSpace`.
     """
@@ -303,9 +300,8 @@ class Stack:
             raise Refusal(
                 "k", str(wrong[0]), f"wavenumbers must be finite, at most {MOST:g}, with a positive real part"
             )
-        top = self.planes(k.ravel(), omega)[0]
         with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode
-            block = product(top.u, adjugate(top.t)) / det(top.t)
+            block = self.columns((0, 1), k.ravel(), omega)
         return np.moveaxis(block, -1, 0).reshape(*k.shape, 2, 2)
 
     def without_empty_layers(self) -> Stack:
@@ -336,44 +332,19 @@ class Stack:
         """
         return _last_pole(self.layers, self.materials(omega), omega)
 
-    def planes(self, k: Array, omega: float, depth: float = 0.0) -> list[Plane]:
-        """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
+    def columns(self, ways: Sequence[int], k: Array, omega: float) -> Array:
+        """Return (u_r, u_z) per unit surface traction along r (0) or z (1) of `ways`, shape (2, ways, n), in m/Pa."""
+        *materials, base = self.materials(omega)
+        top = underside(base, k)
+        for layer, material in zip(reversed(self.layers), reversed(materials), strict=True):
+            top = raise_plane(material, layer.thickness, k, top)
+        return product(top.u, adjugate(top.t)[:, ways] / det(top.t))
 
-        The cut (in a layer or in the half-space) changes no result.
-        """
-        materials = self.materials(omega)
-        planes = [underside(materials[-1], k)]
-        for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers], depth)):
-            planes.append(raise_plane(materials[kind], h, k, planes[-1], with_bottom=above))
-        return planes[::-1]
-
-    def transfer(self, ways: Sequence[int], k: Array, omega: float, depth: float) -> Array:
-        """Return (u_r, u_z) at `depth` per unit surface traction along r (0) or z (1) of `ways`, shape (2, ways, n)."""
-        planes = self.planes(k, omega, depth)
-        top = planes[0]
-        c = adjugate(top.t)[:, ways] / det(top.t)
-        if depth == 0.0:
-            return product(top.u, c)
-        states = product(top.states, c)
-        materials = self.materials(omega)
-        pieces = _cut([layer.thickness for layer in self.layers], depth)
-        for (plane, below), (kind, _, _) in zip(pairwise(planes), pieces, strict=True):
-            if plane.bottom is None:
-                break
-            states = product(plane.bottom, c)
-            material = materials[kind]
-            stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
-            c = parameter(below, states[:2], states[2:], stiffness)
-        return states[:2]
-
-    def shear_transfer(self, k: Array, omega: float, depth: float) -> Array:
-        """Return u_theta at `depth` per surface traction of horizontally polarised shear (m/Pa), shape (n,)."""
-        *layers, base = self.materials(omega)
-        pieces = [
-            ([*layers, base][kind], h, above)
-            for kind, h, above in _cut([layer.thickness for layer in self.layers], depth)
-        ]
-        return shear_compliance(base, pieces, k)
+    def shear_column(self, k: Array, omega: float) -> Array:
+        """Return u_theta per surface traction of horizontally polarised shear (m/Pa), shape (n,)."""
+        *materials, base = self.materials(omega)
+        thicknesses = (layer.thickness for layer in reversed(self.layers))
+        return shear_compliance(base, zip(reversed(materials), thicknesses, strict=True), k)
 
 
 def _last_pole(layers: tuple[Layer, ...], materials: tuple[Material, ...], omega: float) -> float:
@@ -394,18 +365,3 @@ def _material(material: Layer | HalfSpace, omega: float, least_loss: float) -> M
     shear = complex(shear.real, max(shear.imag, least_loss * shear.real))
     ks2 = material.density * omega * omega / shear if shear != 0 else 0.0
     return Material(shear, compressibility(material.poisson_ratio), complex(ks2))
-
-
-def _cut(thicknesses: list[float], depth: float) -> list[tuple[int, float, bool]]:
-    """Cut the stack into pieces, top first: (index of the material, thickness, lies above `depth`)."""
-    pieces: list[tuple[int, float, bool]] = []
-    top = 0.0
-    for i, h in enumerate(thicknesses):
-        if top < depth < top + h:
-            pieces += [(i, depth - top, True), (i, top + h - depth, False)]
-        else:
-            pieces.append((i, h, top + h <= depth))
-        top += h
-    if depth > top:
-        pieces.append((len(thicknesses), depth - top, True))
-    return pieces

@@ -32,7 +32,7 @@ the two terms of each sum are of one sign but at a resonance of the stack, so th
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import factorial
 from typing import Any, NamedTuple
@@ -49,6 +49,12 @@ class Material:
     shear: complex
     eps: float
     ks2: complex
+
+    @property
+    def branch_points(self) -> tuple[complex, complex]:
+        """Wavenumbers (1/m) of the two waves, k_p and k_s: next to them a vertical rate is a square root."""
+        ks = np.sqrt(self.ks2)
+        return np.sqrt(self.eps) * ks, ks
 
 
 @dataclass(frozen=True)
@@ -91,8 +97,7 @@ def decaying_root(squared: Array) -> Array:
 
 def vertical_rates(material: Material, k: Array) -> tuple[Array, Array]:
     """Return vertical rates g_p and g_s (1/m), factored so that they keep their digits next to the branch points."""
-    ks = np.sqrt(material.ks2)
-    kp = np.sqrt(material.eps) * ks
+    kp, ks = material.branch_points
     return decaying_root((k - kp) * (k + kp)), decaying_root((k - ks) * (k + ks))
 
 
@@ -115,14 +120,9 @@ def decay_over(material: Material, solved: Waves, h: float) -> Array:
     phase = material.ks2 * (1.0 - material.eps) * h / sum_  # (g_p - g_s) h
     turned = phase.real > 0
     towards = np.where(turned, -phase, phase)
-    regular = _expm1_over(towards) * np.where(turned, es, ep)
+    safe = np.where(towards == 0, 1.0, towards)
+    regular = np.where(towards == 0, 1.0, np.expm1(safe) / safe) * np.where(turned, es, ep)
     return np.array([[ep, (1.0 - material.eps) * h / sum_ * regular], [np.zeros_like(ep), es]])
-
-
-def _expm1_over(x: Array) -> Array:
-    """Return (e^x - 1) / x, 1 at x = 0."""
-    safe = np.where(x == 0, 1.0, x)
-    return np.where(x == 0, 1.0, np.expm1(safe) / safe)
 
 
 THIN = 0.4
@@ -214,12 +214,10 @@ def _product(one: Array, other: Array, trace: Array, determinant: Array) -> Arra
 class Plane(NamedTuple):
     """States at an interface per parameter c, shape (4, 2, n).
 
-    bottom: if asked, those at the layer's bottom per the same c; summed: whether some are as the series left them, not
-    `charted`.
+    summed: whether some are as the series left them, not `charted`.
     """
 
     states: Array
-    bottom: Array | None = None
     summed: bool = False
 
     @property
@@ -240,9 +238,8 @@ def underside(material: Material, k: Array) -> Plane:
     return Plane(solve_waves(material, k, *vertical_rates(material, k)).down)
 
 
-def raise_plane(material: Material, h: float, k: Array, below: Plane, with_bottom: bool = False) -> Plane:
+def raise_plane(material: Material, h: float, k: Array, below: Plane) -> Plane:
     """Return the plane at a layer's top from the plane at its bottom, each wavenumber by the method that suits it."""
-    below = Plane(below.states, below.states if with_bottom else None, below.summed)
     if h == 0.0:
         return below
     rates = vertical_rates(material, k)
@@ -252,15 +249,10 @@ def raise_plane(material: Material, h: float, k: Array, below: Plane, with_botto
         if part.size == k.size:
             return method(material, h, k, rates, below)
     states = np.empty_like(below.states)
-    bottom = np.empty_like(states) if with_bottom else None
     for method, part in parts:
-        here = below.states[..., part]
-        plane = Plane(here, here if with_bottom else None, below.summed)
-        top = method(material, h, k[part], (rates[0][part], rates[1][part]), plane)
-        states[..., part] = top.states
-        if bottom is not None:
-            bottom[..., part] = top.bottom
-    return Plane(states, bottom, summed=True)
+        plane = Plane(below.states[..., part], below.summed)
+        states[..., part] = method(material, h, k[part], (rates[0][part], rates[1][part]), plane).states
+    return Plane(states, summed=True)
 
 
 def merging(material: Material, h: float, k: Array, rates: tuple[Array, Array]) -> np.ndarray:
@@ -283,7 +275,7 @@ def _thin(material: Material, h: float, k: Array, rates: tuple[Array, Array], be
     for _ in range(pieces):
         if below.summed:
             below = charted(below)
-        below = Plane(layer.raised(below.states), below.bottom, summed=True)
+        below = Plane(layer.raised(below.states), summed=True)
     return below
 
 
@@ -300,64 +292,37 @@ def _thick(material: Material, h: float, k: Array, rates: tuple[Array, Array], b
     system, given = less[0] + less[1], more[1] - more[0]
     e = decay_over(material, waves, h)
     reflected = product(adjugate(system), product(given, e)) / det(system)
-    bottom = None
-    if below.bottom is not None:
-        bottom = product(waves.down, e) + UPWARDS * product(waves.down, reflected)
-    return Plane(waves.down + UPWARDS * product(waves.down, product(e, reflected)), bottom)
+    return Plane(waves.down + UPWARDS * product(waves.down, product(e, reflected)))
 
 
 def charted(raw: Plane) -> Plane:
     """Return the same plane with u or t the identity, whichever inverse is better conditioned."""
     det_u, det_t = det(raw.u), det(raw.t)
-    square_u, square_t = _squares(raw)
+    # of the Frobenius norms
+    square_u, square_t = np.square(np.abs(raw.states)).reshape(2, 4, -1).sum(axis=1)
     by_u = square_u * np.abs(det_t) <= square_t * np.abs(det_u)
     inverse = adjugate(np.where(by_u, raw.u, raw.t)) / np.where(by_u, det_u, det_t)
     ratio = product(np.where(by_u, raw.t, raw.u), inverse)
     states = np.empty_like(raw.states)
     one = np.eye(2)[..., None]
     states[:2], states[2:] = np.where(by_u, one, ratio), np.where(by_u, ratio, one)
-    return Plane(states, None if raw.bottom is None else product(raw.bottom, inverse))
+    return Plane(states)
 
 
-def parameter(plane: Plane, u: Array, t: Array, stiffness: Array) -> Array:
-    """Return the c, shape (2, m, n), of a state (u, t) on a plane, from a layer above it.
+def shear_compliance(half_space: Material, layers: Iterable[tuple[Material, float]], k: Array) -> Array:
+    """Return the SH displacement per surface traction (m/Pa), shape (n,), for wavenumbers k (n,) in 1/m.
 
-    stiffness: traction over displacement of that layer's waves (Pa/m), which is how their rounding compares. On a
-    stiffer medium u is the rest of cancelling waves, on a softer one t is: each would lose the contrast.
-    """
-    det_u, det_t = det(plane.u), det(plane.t)
-    with np.errstate(divide="ignore", invalid="ignore"):  # of the one that is singular, which is not taken
-        norm_u, norm_t = np.sqrt(_squares(plane))
-        by_t = norm_t * np.abs(det_u) * stiffness < norm_u * np.abs(det_t)
-    block, size = np.where(by_t, plane.t, plane.u), np.where(by_t, det_t, det_u)
-    return product(adjugate(block), np.where(by_t, t, u)) / size
-
-
-def _squares(plane: Plane) -> np.ndarray:
-    """Return the squared Frobenius norms of U and of T, shape (2, n)."""
-    return np.square(np.abs(plane.states)).reshape(2, 4, -1).sum(axis=1)
-
-
-Piece = tuple[Material, float, bool]
-"""Material, thickness (m), and whether the piece lies above the depth that is asked for; top first."""
-
-
-def shear_compliance(half_space: Material, pieces: Sequence[Piece], k: Array) -> Array:
-    """Return the SH displacement at the depth per surface traction (m/Pa), shape (n,), for wavenumbers k (n,) in 1/m.
-
-    The depth is the top of the first piece that is not above it, or of the half-space; 0 where no piece is above.
+    layers: material and thickness (m), the lowest first.
     """
     rate = vertical_rates(half_space, k)[1]
     u, t = np.ones_like(rate), half_space.shear * rate
-    seen = u
-    for material, h, above in reversed(pieces):
-        u, t, scale = _raise_shear(material, h, k, u, t)
-        seen = seen * scale if above else u
-    return seen / t
+    for material, h in layers:
+        u, t = _raise_shear(material, h, k, u, t)
+    return u / t
 
 
-def _raise_shear(material: Material, h: float, k: Array, u: Array, t: Array) -> tuple[Array, Array, Array]:
-    """Return the state at a layer's top for that at its bottom, up to a factor, and that factor.
+def _raise_shear(material: Material, h: float, k: Array, u: Array, t: Array) -> tuple[Array, Array]:
+    """Return the state at a layer's top for that at its bottom, up to a factor.
 
     exp(-g h) times cosh and sinh; then over the larger of the two entries, each in its own unit, so that neither
     overflows over many layers.
@@ -371,4 +336,4 @@ def _raise_shear(material: Material, h: float, k: Array, u: Array, t: Array) -> 
     top_t = material.shear * rate * rate * sinh_over_rate * u + cosh * t
     stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
     size = np.maximum(np.abs(top_u), np.abs(top_t) / stiffness)
-    return top_u / size, top_t / size, once / size
+    return top_u / size, top_t / size

@@ -25,7 +25,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.special import factorial2
 
-from unitcad.attenuation.layered.loads import Load, bessel_bounds, bessels
+from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, bessels
 from unitcad.attenuation.layered.propagation import Array, Material
 
 PHASE = 8.0 * np.pi
@@ -71,7 +71,9 @@ def from_origin(end: float, stop: float, span: float, materials: tuple[Material,
         close = np.arange(halvings, max(halvings - _CLOSE, 0), -1)
         times = np.concatenate([close, np.arange(close[-1] - 2, 0, -2), [0]])
         line = np.concatenate([[0.0], line[1] * 0.5**times, line[2:]])
-    return _turned(line, _branch_points(materials[-1]), 1.0 / span)
+    # On the axis are the branch points of a half-space without damping.
+    on_axis = {k.real for k in materials[-1].branch_points if k.real > 0 and k.imag == 0}
+    return _turned(line, sorted(on_axis), 1.0 / span)
 
 
 def onwards(start: float, stop: float, span: float) -> Array:
@@ -95,14 +97,6 @@ def _continued(line: np.ndarray, stop: float, longest: float) -> np.ndarray:
     while corners[-1] < stop and len(corners) < MAX_PANELS:
         corners.append(min(stop, corners[-1] + min(corners[-1], MOST_PIECES * longest)))
     return np.array(corners)
-
-
-def _branch_points(half_space: Material) -> list[float]:
-    """Return the branch points on the axis: those of a half-space without damping."""
-    if half_space.shear == 0 or half_space.ks2.imag != 0 or half_space.ks2 == 0:
-        return []
-    ks = half_space.ks2.real**0.5
-    return sorted({k for k in (half_space.eps**0.5 * ks, ks) if k > 0})
 
 
 def _plain(line: np.ndarray) -> Array:
@@ -171,9 +165,18 @@ def _to_legendre() -> Array:
 
 
 def nodes(panels: Array) -> tuple[Array, Array]:
-    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
+    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes).
+
+    Next to a branch point the kernel may be one over a root that the slope cancels. So no wavenumber is rounded to the
+    branch point, and the slope is that at the rounded wavenumber.
+    """
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * _AT)
+    k, slope = wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * _AT)
+    base, turn = panels[:, 2, None], panels[:, 3, None]
+    if np.any(turn):
+        k = np.where(k == base, base * (1.0 + turn * np.finfo(float).eps), k)
+        slope = np.where(turn == 0, slope, 2.0 * turn * np.sqrt(turn * (k - base)))
+    return k, slope
 
 
 def closeness(panels: Array) -> np.ndarray:
@@ -262,7 +265,7 @@ class Seen(Protocol):
     """A load, seen at radii r (m), shape (n,)."""
 
     @property
-    def load(self) -> Load: ...
+    def load(self) -> UniformDisc: ...
 
     @property
     def r(self) -> np.ndarray: ...
@@ -367,7 +370,7 @@ def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
 
 
 def _span(seen: Seen) -> float:
-    return float(seen.r.max()) + seen.load.reach
+    return float(seen.r.max()) + seen.load.radius
 
 
 def _integrated(
