@@ -103,22 +103,16 @@ def _print_details(data: Mapping[str, Any]) -> None:
 
 def _sums(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
     """Tabulate the amplitude at each unit from all others."""
-    mixed = len({place["drive"] for place in data["places"]}) > 1
-    labels = {"own_drive": "own"} if mixed else {}
-    labels |= {"flat": "flat", "axial": "axial"}
-    sums = {
-        f"{label}\n{head}": data["sums"][key][kind]
-        for key, label in labels.items()
-        for head, kind in (("root", "root_sum_of_squares"), ("sum", "sum"))
-    }
-    return [{"unit": name, **{head: number(at[i], 2) for head, at in sums.items()}} for i, name in enumerate(names)]
+    sums = data["sums"]
+    return [
+        {"unit": name, "root": number(root, 2), "sum": number(total, 2)}
+        for name, root, total in zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
+    ]
 
 
 def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
-    """Tabulate the decay between each two units, by the own drive of the one that drives."""
-    rows = []
-    for i, place in enumerate(data["places"]):
-        decays = zip(names, data["matrix"][place["drive"]]["centre"][i], strict=True)
-        shares = {name: "-" if value is None else number(100 * value, 2) for name, value in decays}
-        rows.append({"drives": place["name"], **shares})
-    return rows
+    """Tabulate the decay between each two units."""
+    return [
+        {"drives": name, **{to: "-" if v is None else number(100 * v, 2) for to, v in zip(names, row, strict=True)}}
+        for name, row in zip(names, data["matrix"], strict=True)
+    ]
