@@ -138,7 +138,7 @@ def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(procedure)
     assert [step.title for step in procedure.release] == ["Filament out", "Peel off"]
     assert procedure.time_line[-1].name == "motors and circuit in"
     # What is cast flat bonds later.
-    assert all(pour.agent == () for pour in procedure.pours)
+    assert not any("Release agent, if any" in step.text for pour in procedure.pours for step in pour.steps)
     assert "No release agent" in next(step.text for step in procedure.pours[0].steps if step.title == "Cup 1 on")
 
 

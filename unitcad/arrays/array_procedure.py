@@ -25,8 +25,6 @@ from unitcad.casting.figures import (
     Batch,
 )
 from unitcad.casting.pouring import (
-    BondFace,
-    Face,
     after_pours,
     cure,
     injection_steps,
@@ -95,10 +93,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         for each, silicone, volume in zip(flat.plan.steps, silicones[:-1], layer_volumes_mm3[:-1], strict=True)
     ]
     batch = Batch(under_lid, step, silicones[-1], layer_volumes_mm3[-1], 1)
-    flat_pours = tuple(
-        replace(each, agent=(), steps=tuple(pour_steps(of, shown)))
-        for each, of in zip(made.pours, flat_batches, strict=True)
-    )
+    flat_pours = tuple(pour_of(each, pour_steps(each, shown)) for each in flat_batches)
     steps = (
         *_laid_in(moulds, flat, silicones[0]),
         *_lid_on(moulds, step),
@@ -119,7 +114,6 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         printing=printing(moulds, printed_mm3, _tallest(moulds)),
         preparation=prepared,
         pours=pours,
-        bonds=tuple(_bonds(moulds)),
         release=out,
         assembly=together,
         measure=tuple(_measure_curved(moulds, grams)),
@@ -264,16 +258,6 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
         minutes=PEEL_MIN * units,
         required_tools=("small scissors", "blunt spatula"),
     )
-
-
-def _bonds(moulds: PatchMoulds) -> Iterator[BondFace]:
-    """Yield every face of the tools that forms a later bond face."""
-    *inner, last = moulds.plan.steps
-    for step in inner:
-        yield BondFace(Face(step.cup, "bore"), f"layer {step.index + 1}")
-    yield BondFace(Face(moulds.plan.base_of(inner[0]), "core"), "motor")
-    yield BondFace(Face(moulds.plan.base_of(inner[0]), "seat"), "the next layer")
-    yield BondFace(Face(moulds.plan.base_of(last), "core and moat"), f"layer {last.index - 1}")
 
 
 def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
@@ -435,7 +419,6 @@ def pocket_procedure(
         label=moulds.plan.label,
         cells=1,
         vacuum=spec.casting.vacuum,
-        tunnels=(),
         earliest_finish_min=finish,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
@@ -443,11 +426,9 @@ def pocket_procedure(
         preparation=(*cast, *prepared),
         unit_heights=(),
         pours=(pour,),
-        bonds=(),
         release=out,
         assembly=together,
         measure=tuple(_measure(array, grams, units)),
-        eccentricity=None,
         troubles=troubles(moulds),
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",

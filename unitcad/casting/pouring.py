@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from unitcad.casting.drawings import grip_of, tape_places, tongue_prop
 from unitcad.casting.figures import (
@@ -43,49 +42,6 @@ TACK = "It is done if a gloved finger comes off clean and a fingernail's dent sp
 """How to tell cured silicone from tacky silicone."""
 LEVEL_AGAIN = "Correct the level with paper."
 """How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
-
-
-@dataclass(frozen=True)
-class Face:
-    """A face of a tool that silicone takes its shape from, such as the bore of "cup1"."""
-
-    tool: str
-    face: str
-
-
-@dataclass(frozen=True)
-class BondFace:
-    """A face of a tool whose cast bonds later, to `to`. Silicone does not bond where agent was."""
-
-    face: Face
-    to: str
-
-
-def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
-    """Return every face of the tools that forms a bonding face, or that is next to one in a later pour."""
-    plan, last = moulds.plan, moulds.plan.steps[-1]
-    found = []
-    for step in plan.steps:
-        if step is not last:
-            found.append((step.cup, "bore", f"layer {step.index + 1}"))
-        if step.lid and not (step is last and moulds.spec.motor.absent):
-            found.append((step.lid, "underside", "circuit" if step is last else f"layer {step.index + 1}"))
-    if not plan.concentric and not plan.pins and len(plan.steps) > 1:
-        # Its bore may meet a layer that is cured already, to which the last one has to bond; a back sheet's, whose cups
-        # are on pins, meets none.
-        found.append((last.cup, "bore", f"layer {last.index - 1}"))
-    if not moulds.spec.motor.absent:
-        found.append(("base", "core", "motor"))
-    if len(plan.steps) > 1:
-        found.append(("base", "seat", "the next layer"))
-    return tuple(BondFace(Face(tool, face), to) for tool, face, to in found)
-
-
-def agent_faces(moulds: MouldSet, step: Step) -> tuple[Face, ...]:
-    """Return the faces that may get release agent before a pour: the last cup's bore, if nothing bonds to it later."""
-    bore = Face(step.cup, "bore")
-    bonds = any(bond.face == bore for bond in bond_faces(moulds))
-    return () if bonds or step is not moulds.plan.steps[-1] else (bore,)
 
 
 def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
@@ -136,17 +92,17 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             minutes=1.0 * cells,
             required_tools=("petroleum jelly",),
         )
-    # The faces that get release agent, and why no other does.
-    faces, agent = agent_faces(moulds, step), "No release agent: what is cast here bonds later."
-    if faces and plan.pins:
+    # Nothing bonds to the last cup's bore. One by complement may meet a cured layer, to which its own has to bond.
+    bare = step is plan.steps[-1] and (plan.concentric or bool(plan.pins) or n == 1)
+    agent = "No release agent: what is cast here bonds later."
+    if bare and plan.pins:
         earlier = f" and Layer {n - 1}" if n > 1 else ""
         agent = (
             f"Release agent, if any, thinly and only on the sheet's bed and the bores of cup {n}, away from the base: "
             f"a printed cup holds a thin sheet fast. None in the fins' slots, on the base{earlier}."
         )
-    elif faces:
-        where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
-        agent = f"Release agent, if any, thinly and only on {where}, away from the {holds(moulds)}."
+    elif bare:
+        agent = f"Release agent, if any, thinly and only on the bore of cup {n}, away from the {holds(moulds)}."
     # Ribs centre the cup, or a push as for the cup before.
     if ribs(spec, plan.layout):
         on = "on and press it down evenly until it sits; its ribs centre it."
@@ -164,7 +120,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         f"{agent} Put cup {n} {on}",
         picture("cup-on"),
         minutes=2.0,
-        required_tools=("release agent",) if faces else (),
+        required_tools=("release agent",) if bare else (),
     )
     if tongues:
         seat = number(window_length(moulds, step), 2)
