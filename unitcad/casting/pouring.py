@@ -214,19 +214,15 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "Lay a screwdriver in each pry slot, its tip under the cup. Press both handles down together, little by "
             "little."
         )
+    back = "from the skin's side" if step is plan.steps[-1] else "and put it back"
     yield BenchStep(
         f"Cup {n} off",
-        f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. {recovery(moulds, n)}",
+        f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. Layer {n} should stay on "
+        f"the {holds(moulds)}: if it comes off in the cup, push it out {back}.",
         picture("cup-off"),
         minutes=LIFT_MIN,
         required_tools=("blunt spatula",) if split else (),
     )
-
-
-def recovery(moulds: MouldSet, layer: int) -> str:
-    """Say where a layer stays when its cup is lifted, and what to do if it does not."""
-    back = "from the skin's side" if layer == len(moulds.plan.steps) else "and put it back"
-    return f"Layer {layer} should stay on the {holds(moulds)}: if it comes off in the cup, push it out {back}."
 
 
 def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
@@ -371,22 +367,17 @@ def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
     )
 
 
-def never_pushed(spec: Spec, inner: Material) -> str:
-    """Describe the effect of pulling a filament, and of pushing it: `inner` is Layer 1's silicone."""
-    tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
-    return f"it lets air in under the unit. Never push it through: {number(tear, 2)} N tear {inner.name} (computed)."
-
-
 def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
     """Describe the way from the last cured layer to a unit in the hand; `first` is Layer 1's silicone."""
     plan, cells, last = moulds.plan, len(moulds.plan.layout.cells), moulds.plan.steps[-1]
     cup, removed = spaced(last.cup), {removal.piece for removal in last.removals}
     if plan.of_kind("filament"):
         each = "the" if cells == 1 else "each"
+        tear = float(first.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
         yield BenchStep(
             "Filament out",
-            f"Lift the mould off the bench. Pull {each} filament out downwards, by its bent end: "
-            f"{never_pushed(moulds.spec, first)}",
+            f"Lift the mould off the bench. Pull {each} filament out downwards, by its bent end: it lets air in under "
+            f"the unit. Never push it through: {number(tear, 2)} N tear {first.name} (computed).",
             picture_path("filament-out"),
             minutes=PULL_MIN * cells,
         )

@@ -463,12 +463,6 @@ _Key = tuple[Placed | Extra, bool]
 """The content of a view, and whether it is of the unit, not of its moulds."""
 
 
-def pictures(moulds: MouldSet) -> dict[str, bytes]:
-    """Return the PNG of every view of a set's procedure by its path in the result's folder."""
-    bench = BenchPictures(moulds)
-    return {picture_path(name): bench.picture(name) for name in bench.names}
-
-
 class BenchPictures:
     """The pictures of a set's procedure, each drawn when it is asked for.
 
