@@ -50,20 +50,6 @@ from unitcad.spec import Spec
 from unitcad.text import join_words, number, spaced
 
 
-def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
-    """Return the procedure of an array whose units are cast with the sheet: nothing is meshed or drawn.
-
-    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
-    """
-    made = procedure(moulds, layer_volumes_mm3, printed_mm3)
-    return replace(
-        made,
-        assembly=motors_in(made.assembly),
-        time_line=(*made.time_line[:-1], replace(made.time_line[-1], name="motors and circuit in")),
-        last="Motors and circuit in",
-    )
-
-
 def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
     """Return the steps of the assembly, each with its own title: soldering shows no state of the mould."""
     solder, lay_in, cure = steps
@@ -75,10 +61,7 @@ def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
 
 
 def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
-    """Return the procedure of an array that is cast round the limb: nothing is meshed or drawn.
-
-    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
-    """
+    """Return the procedure of an array that is cast round the limb; volumes as for `array_procedure`."""
     flat = moulds.cast_flat
     assert flat is not None
     made, shown = procedure(flat, layer_volumes_mm3[:-1], printed_mm3), views(flat)
@@ -106,12 +89,14 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     out, together = tuple(_out_of_curved(moulds)), motors_in(tuple(motor_in(moulds, silicones)))
     every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
     grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
+    last = [tool for tool in moulds.plan.pieces if tool.step == step.index and tool.made == "printed"]
+    ends = [moulds.mesh(tool).bounding_box()[2::3] for tool in last]
     return replace(
         made,
         name=spec.name,
         label=moulds.plan.label,
         **times(prepared, pours, out, "motors and circuit in", together),
-        printing=printing(moulds, printed_mm3, _tallest(moulds)),
+        printing=printing(moulds, printed_mm3, max(high - low for low, high in ends)),
         preparation=prepared,
         pours=pours,
         release=out,
@@ -125,12 +110,6 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
 def _picture(step: Step, name: str) -> str:
     """Return the path of a view of the last pour."""
     return picture_path(f"pour{step.index}-{name}")
-
-
-def _tallest(moulds: PatchMoulds) -> float:
-    """Return the height of base or lid of the last pour as it is printed, mm."""
-    last = [tool for tool in moulds.plan.pieces if tool.step == len(moulds.plan.steps) and tool.made == "printed"]
-    return max(high - low for low, high in (moulds.mesh(tool).bounding_box()[2::3] for tool in last))
 
 
 def _base(moulds: PatchMoulds) -> str:
@@ -153,7 +132,7 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
 
 def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
     """Return the steps by which the inner layers move from their flat base to the curved one."""
-    units, base, step = len(moulds.arranged.places), _base(moulds), moulds.plan.steps[-1]
+    units, base, step = len(moulds.array.places), _base(moulds), moulds.plan.steps[-1]
     lid = spaced(step.lid or "")
     cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
     pulled = next(iter(flat_release(flat, inner)))
@@ -201,7 +180,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
 
 def _lengths(moulds: PatchMoulds) -> str:
     """Return the lengths of the straight filaments, mm: along the unit's axis, from the core's top to the bench."""
-    array = moulds.arranged
+    array = moulds.array
     radius, middle = array.radius_mm or 0.0, array.middle_radius_mm or 1.0
     bottom = moulds.plan.tool(moulds.plan.base_of(moulds.plan.steps[-1])).shape
     low = moulds.mesh_of(bottom).bounding_box()[2]
@@ -241,7 +220,7 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
 
 def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Describe the way from the cured sheet to a sleeve in the hand."""
-    units, base = len(moulds.arranged.places), _base(moulds)
+    units, base = len(moulds.array.places), _base(moulds)
     yield BenchStep(
         "Filament out",
         f"Lift the mould off the bench, lay {base} on its side. Take each filament with pliers in its pocket and pull "
@@ -261,7 +240,7 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 
 def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
-    array: Array = moulds.arranged
+    array: Array = moulds.array
     yield moulds.across
     yield (
         f"The sheet between the units: {grams_shown(array.sheet.thickness_mm, 2)} mm thick, at its four edges and in "
@@ -273,7 +252,7 @@ def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str
 
 def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
     """Yield the bill of the whole set, with bent and straight filaments as separate items."""
-    places = len(moulds.arranged.places)
+    places = len(moulds.array.places)
     for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
         if item.item == "filament":
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
@@ -283,6 +262,7 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
             yield item
 
 
+WIRE = "thin and insulated, two for each tail that ends under the sheet"
 ONCE = frozenset((name, unit) for name, (unit, _, _) in REQUIRED_TOOLS.items())
 """Things, by name and unit, of which one piece, dab or roll is enough for every casting: a roll of tape, no strips."""
 
@@ -291,16 +271,18 @@ def pocket_bill(
     moulds: PatchMoulds, batch: Batch, steps: Sequence[BenchStep], units: Mapping[str, Procedure]
 ) -> tuple[Item, ...]:
     """Return the bill of units and sheet. `batch` and `steps`: of the sheet; `units` by their folder."""
-    silicone, mix = batch.silicone, batch.mix
+    silicone, mix, covered = batch.silicone, batch.mix, covered_tails(moulds.array)
     net = f"sheet: {number(mix.net_g, 3)} g net"
+    # A motor has two poles.
+    wires = [Item("lead wire", 2 * len(covered), "piece", "bought", WIRE)] if covered else []
     own = [
         *(replace(item, note=f"for the sheet: {item.note}") for item in list_pieces(moulds)),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", net),
-        *_wires(moulds.arranged),
+        *wires,
         *list_consumables(moulds, [batch], steps),
     ]
-    return tuple(_added([*_scaled(moulds.arranged, units), *own]))
+    return tuple(_added([*_scaled(moulds.array, units), *own]))
 
 
 def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str, Procedure, int, int]]:
@@ -310,13 +292,6 @@ def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str,
         (spec, folder, unit, held[i], math.ceil(held[i] / unit.cells))
         for i, (spec, (folder, unit)) in enumerate(zip(array.units, units.items(), strict=True))
     ]
-
-
-def _wires(array: Array) -> Iterator[Item]:
-    """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
-    if covered := covered_tails(array):
-        note = "thin and insulated, two for each tail that ends under the sheet"
-        yield Item("lead wire", 2 * len(covered), "piece", "bought", note)
 
 
 def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
@@ -371,10 +346,9 @@ def pocket_procedure(
 ) -> Procedure:
     """Return the procedure of an array whose units are cast apart.
 
-    `sheet_mm3`: volume of the sheet. `printed_mm3`: of tray and blade. `units`: the procedure of each distinct unit
-    by its folder, in the order of `Array.units`.
+    `units`: the procedure of each distinct unit by its folder, in the order of `Array.units`.
     """
-    array, spec, (step,) = moulds.arranged, moulds.spec, moulds.plan.steps
+    array, spec, (step,) = moulds.array, moulds.spec, moulds.plan.steps
     silicone = catalogue.materials(spec.materials)[step.material]
     batch = Batch(moulds, step, silicone, sheet_mm3, 1)
     cast = tuple(_units(array, units))
@@ -487,7 +461,7 @@ def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedu
     files = [f"{folder}/{plate}" for folder, unit in units.items() for plate in unit.printing.plates]
     return replace(
         sheet,
-        sizes=tuple(_sizes(moulds.arranged, of_units)),
+        sizes=tuple(_sizes(moulds.array, of_units)),
         plates=(*sheet.plates, *files),
         minutes=sheet.minutes + sum(each.minutes for each in of_units),
         cm3=sheet.cm3 + sum(each.cm3 for each in of_units),
@@ -505,7 +479,7 @@ def _sizes(array: Array, of_units: Sequence[Printing]) -> Iterator[Size]:
 
 
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
-    thick = number(moulds.arranged.sheet.thickness_mm, 3)
+    thick = number(moulds.array.sheet.thickness_mm, 3)
     yield BenchStep(
         "Peel off",
         "Cut the sheet free from the groove's silicone along the land. Loosen a corner with a blunt spatula and peel "
@@ -577,4 +551,11 @@ def array_procedure(
         return pocket_procedure(moulds, layer_volumes_mm3[0], printed_mm3, of_units)
     if way.cast == "curved":
         return curved_procedure(moulds, layer_volumes_mm3, printed_mm3)
-    return back_sheet_procedure(moulds, layer_volumes_mm3, printed_mm3)
+    made = procedure(moulds, layer_volumes_mm3, printed_mm3)
+    *line, last = made.time_line
+    return replace(
+        made,
+        assembly=motors_in(made.assembly),
+        time_line=(*line, replace(last, name="motors and circuit in")),
+        last="Motors and circuit in",
+    )

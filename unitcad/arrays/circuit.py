@@ -20,7 +20,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, OpType
 from msgspec.structs import replace
 
-from unitcad.arrays.array import Array, Placed
+from unitcad.arrays.array import Array
 from unitcad.arrays.array_tables import CircuitTable
 from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.sheet import LENGTH, at_place
@@ -189,20 +189,16 @@ def _in_the_way(array: Array, rows: Sequence[Strip], spine: Sequence[Strip], own
     A row passes through its units, so does an `own` spine.
     """
     for strip in (*rows, *spine):
-        through = own or strip in rows
+        through, (x0, y0), (x1, y1) = own or strip in rows, strip.start, strip.end
         for place in array.places:
-            if through and _on_line(strip, place):
+            off = abs((x1 - x0) * (place.y - y0) - (y1 - y0) * (place.x - x0))
+            if through and off < _EPS * math.hypot(x1 - x0, y1 - y0):
                 continue
             if to_segment((place.x, place.y), strip.start, strip.end) < place.radius + strip.half + CLEAR - _EPS:
                 return f"the unit {place.name}"
         if any(to_box(strip.start, strip.end, slot) < strip.half + CLEAR - _EPS for slot in array.sheet.strap_slots):
             return "a strap slot"
     return ""
-
-
-def _on_line(strip: Strip, place: Placed) -> bool:
-    (x0, y0), (x1, y1) = strip.start, strip.end
-    return abs((x1 - x0) * (place.y - y0) - (y1 - y0) * (place.x - x0)) < _EPS * math.hypot(x1 - x0, y1 - y0)
 
 
 def _check_bend(array: Array, pads: Sequence[CircuitPad], thickness: float, table: CircuitTable) -> None:

@@ -138,7 +138,10 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
         "array": array.name,
         "tissue": units.inputs[0].tissue_name,
         "range": RANGE,
-        "distances": _along(array),
+        "distances": "along the skin, taken as flat"
+        if array.radius_mm is None
+        else f"along the skin, unrolled: round the limb of radius {array.radius_mm:g} mm a distance is the arc, the "
+        "shorter way round; the decay is that of flat skin",
         "places": [
             {
                 "name": place.name,
@@ -213,15 +216,6 @@ def _absolute(
     }
 
 
-def _along(array: Array) -> str:
-    if array.radius_mm is None:
-        return "along the skin, taken as flat"
-    return (
-        f"along the skin, unrolled: round the limb of radius {array.radius_mm:g} mm a distance is the arc, the shorter "
-        "way round; the decay is that of flat skin"
-    )
-
-
 def crosstalk_csv(array: Array) -> bytes:
     """Return a CSV file: `from` drives, `to` is moved; distances along the skin in mm, from the middle of `from`.
 
@@ -258,12 +252,12 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
     if nearest is None:
         return ["A single unit has no neighbour: there is no crosstalk."]
     return [
-        f"{_percent(nearest['centre'])} of a unit's motion at its edge reaches the middle of its nearest neighbour "
-        f"({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
-        f"and {_percent(nearest['nearest_edge'])} the neighbour's edge.",
-        f"With all other units on, {_most(data)}: {_times(worst['root_sum_of_squares'])} times one "
+        f"{_ranged(nearest['centre'], 100, ' %')} of a unit's motion at its edge reaches the middle of its nearest "
+        f"neighbour ({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
+        f"and {_ranged(nearest['nearest_edge'], 100, ' %')} the neighbour's edge.",
+        f"With all other units on, {_most(data)}: {_ranged(worst['root_sum_of_squares'])} times one "
         f"unit's edge level if the motors are not synchronous (root of the sum of squares), and "
-        f"{_times(worst['sum'])} times if all are in phase.",
+        f"{_ranged(worst['sum'])} times if all are in phase.",
         _absolute_line(worst["place"], data["absolute"]),
         IN_BRACKETS,
     ]
@@ -318,14 +312,9 @@ def ratio_line(one: Mapping[str, Any]) -> str:
     )
 
 
-def _percent(quantity: Mapping[str, float]) -> str:
-    value, low, high = (number(100 * quantity[key], 2) for key in ("value", "low", "high"))
-    return f"{value} % ({low} to {high})"
-
-
-def _times(quantity: Mapping[str, float]) -> str:
-    value, low, high = (number(quantity[key], 2) for key in ("value", "low", "high"))
-    return f"{value} ({low} to {high})"
+def _ranged(quantity: Mapping[str, float], factor: float = 1.0, unit: str = "") -> str:
+    value, low, high = (number(factor * quantity[key], 2) for key in ("value", "low", "high"))
+    return f"{value}{unit} ({low} to {high})"
 
 
 def _absolute_line(place: str, ranges: Mapping[str, Any]) -> str:
