@@ -17,13 +17,7 @@ from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
 from unitcad.arrays.tails import covered_tails, named
 from unitcad.casting.bill import Item, bill, list_consumables, list_pieces, motor_name, mould_plates
-from unitcad.casting.figures import (
-    LAY_IN_MIN,
-    LIFT_MIN,
-    PEEL_MIN,
-    PULL_MIN,
-    Batch,
-)
+from unitcad.casting.figures import LAY_IN_MIN, LIFT_MIN, PEEL_MIN, PULL_MIN, Batch
 from unitcad.casting.pouring import (
     after_pours,
     cure,
@@ -41,7 +35,7 @@ from unitcad.casting.preparation import Printing, Size, cleaning, fall, joining,
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
 from unitcad.casting.troubles import troubles
-from unitcad.casting.views import picture_path, views
+from unitcad.casting.views import picture_path, pour_picture
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.plan import Step
@@ -64,7 +58,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     """Return the procedure of an array that is cast round the limb; volumes as for `array_procedure`."""
     flat = moulds.cast_flat
     assert flat is not None
-    made, shown = procedure(flat, layer_volumes_mm3[:-1], printed_mm3), views(flat)
+    made = procedure(flat, layer_volumes_mm3[:-1], printed_mm3)
     spec, step = moulds.spec, moulds.plan.steps[-1]
     injected_spec = structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
     under_lid = PatchMoulds(injected_spec, moulds.plan, array=moulds.array)
@@ -76,13 +70,13 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         for each, silicone, volume in zip(flat.plan.steps, silicones[:-1], layer_volumes_mm3[:-1], strict=True)
     ]
     batch = Batch(under_lid, step, silicones[-1], layer_volumes_mm3[-1], 1)
-    flat_pours = tuple(pour_of(each, pour_steps(each, shown)) for each in flat_batches)
+    flat_pours = tuple(pour_of(each, pour_steps(each)) for each in flat_batches)
     steps = (
         *_laid_in(moulds, flat, silicones[0]),
         *_lid_on(moulds, step),
         *mixing_steps(batch),
-        *injection_steps(batch, _picture(step, "inject")),
-        cure(batch, "the bead on a vent", "layer", _picture(step, "filled")),
+        *injection_steps(batch, pour_picture(step.index, "inject")),
+        cure(batch, "the bead on a vent", "layer", pour_picture(step.index, "filled")),
         _lid_off(moulds, step),
     )
     pours, prepared = (*flat_pours, pour_of(batch, steps)), (_sort_curved(moulds), *made.preparation[1:])
@@ -105,11 +99,6 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         bill=tuple(_bill(moulds, [*flat_batches, batch], every)),
         last="Motors and circuit in",
     )
-
-
-def _picture(step: Step, name: str) -> str:
-    """Return the path of a view of the last pour."""
-    return picture_path(f"pour{step.index}-{name}")
 
 
 def _base(moulds: PatchMoulds) -> str:
@@ -150,7 +139,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Cut {units} straight filaments, {_lengths(moulds)} mm long. Push one up through each core of {base} from "
         f"below until it is flush with the underside. Put {base} on a flat board, so that none sinks. Trim the upper "
         "ends flush with the cores' tops.",
-        _picture(step, "filament"),
+        pour_picture(step.index, "filament"),
         minutes=3.0 * units,
         required_tools=("sharp knife",),
     )
@@ -173,7 +162,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Lay each over its core of {base}, A1 on A1, its notches over the fins. Press its edge down all round onto "
         "the moat's floor, its top flat on the core: silicone that creeps under it fills the cavity's mouth. No "
         "release agent, no grease on core or moat.",
-        _picture(step, "laid-in"),
+        pour_picture(step.index, "laid-in"),
         minutes=LAY_IN_MIN * units / 2,
     )
 
@@ -199,11 +188,11 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
         f"Draw a thin line of petroleum jelly on the curved land of {base}, near its outer edge. Put {lid} on over the "
         "pins, which let it on one way only. Press it down until it bears on the land all round; at both ends a slit "
         f"of {slit} mm stays open.",
-        _picture(step, "lid-on"),
+        pour_picture(step.index, "lid-on"),
         minutes=LIFT_MIN,
         required_tools=("petroleum jelly",),
     )
-    yield lid_held(step, _picture(step, "lid-held"))
+    yield lid_held(step, pour_picture(step.index, "lid-held"))
 
 
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
@@ -212,7 +201,7 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
         "Remove its bands or clamp. Turn a screwdriver in the slit at either end, little by little, until "
         f"{spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents tear off. Trim them flush with a "
         "knife.",
-        _picture(step, "lid-off"),
+        pour_picture(step.index, "lid-off"),
         minutes=LIFT_MIN,
         required_tools=("sharp knife",),
     )
@@ -456,7 +445,6 @@ def _sort(moulds: PatchMoulds) -> str:
 
 
 def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedure]) -> Printing:
-    """Return the plates of the sheet and of each distinct unit."""
     sheet, of_units = printing(moulds, solid_mm3), [unit.printing for unit in units.values()]
     files = [f"{folder}/{plate}" for folder, unit in units.items() for plate in unit.printing.plates]
     return replace(

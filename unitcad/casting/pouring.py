@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 from unitcad.casting.drawings import grip_of, tape_places, tongue_prop
 from unitcad.casting.figures import (
@@ -28,7 +29,7 @@ from unitcad.casting.figures import (
     window_length,
 )
 from unitcad.casting.steps import BenchStep
-from unitcad.casting.views import is_fed_through, picture_path
+from unitcad.casting.views import is_fed_through, picture_path, pour_picture
 from unitcad.catalogue import Material
 from unitcad.designs.design import ADHESIVE, Fitting, bond
 from unitcad.moulds.cup import ribs
@@ -44,18 +45,15 @@ LEVEL_AGAIN = "Correct the level with paper."
 """How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
 
 
-def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
-    """Describe one pour, from an empty mould to a cured layer on the core; `views`: the names of the pictures."""
+def pour_steps(batch: Batch) -> Iterator[BenchStep]:
+    """Describe one pour, from an empty mould to a cured layer on the core."""
     moulds, step, n = batch.moulds, batch.step, batch.step.index
     plan, spec, tongues = moulds.plan, moulds.spec, moulds.plan.standing(step, "tongue")
     cells, the_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
     # Each cavity has a groove, which stops next to a window.
     groove = "the groove" if len(step.layer) == 1 else "the grooves"
 
-    def picture(name: str) -> str:
-        path = f"pour{n}-{name}"
-        return picture_path(path) if path in views else ""
-
+    picture = partial(pour_picture, n)
     if n > 1:
         bond = "Its outside" if plan.concentric else f"The face that Layer {n} touches"
         yield BenchStep(

@@ -8,12 +8,7 @@ from typing import Any
 
 from unitcad import catalogue
 from unitcad.casting.bill import Item, bill
-from unitcad.casting.figures import (
-    Batch,
-    Figure,
-    UnitHeight,
-    unit_heights,
-)
+from unitcad.casting.figures import Batch, Figure, UnitHeight, unit_heights
 from unitcad.casting.pouring import (
     after_pours,
     film_mm3,
@@ -26,7 +21,6 @@ from unitcad.casting.pouring import (
 from unitcad.casting.preparation import Printing, preparation, printing
 from unitcad.casting.steps import BenchStep, Phase, phases
 from unitcad.casting.troubles import Trouble, troubles
-from unitcad.casting.views import views
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import warnings
 
@@ -111,13 +105,13 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
 
     `layer_volumes_mm3`: of each layer of one unit, from the inside out. `printed_mm3`: of all printed pieces.
     """
-    spec, plan, shown = moulds.spec, moulds.plan, views(moulds)
+    spec, plan = moulds.spec, moulds.plan
     known, cells = catalogue.materials(spec.materials), len(plan.layout.cells)
     batches = [
         Batch(moulds, step, known[step.material], volume, cells)
         for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True)
     ]
-    pours = tuple(pour_of(batch, pour_steps(batch, shown)) for batch in batches)
+    pours = tuple(pour_of(batch, pour_steps(batch)) for batch in batches)
     silicones = [batch.silicone for batch in batches]
     grams = [batch.volume_mm3 * float(batch.silicone.density_g_cm3) / 1000 for batch in batches]
     skin_g = film_mm3(moulds) * float(silicones[-1].density_g_cm3) / 1000

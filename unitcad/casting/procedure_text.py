@@ -45,7 +45,6 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 
 def _shortened(procedure: Procedure) -> Procedure:
-    """Return the procedure with the short texts of its steps."""
     before, after = procedure.preparation, (*procedure.release, *procedure.assembly)
     left = iter(number_steps([*before, *(step for pour in procedure.pours for step in pour.steps), *after]))
 

@@ -135,6 +135,11 @@ def picture_path(name: str) -> str:
     return f"steps/{name}.png"
 
 
+def pour_picture(pour: int, name: str) -> str:
+    """Return the path of a pour's view (from 1)."""
+    return picture_path(f"pour{pour}-{name}")
+
+
 def level_on(moulds: MouldSet) -> Step:
     """Return the first pour whose rim takes a level: nothing on the base is higher."""
     steps, core = moulds.plan.steps, moulds.dimensions.core_height
