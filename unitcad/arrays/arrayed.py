@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -45,7 +45,6 @@ from unitcad.casting.procedure_text import files as written
 from unitcad.casting.steps import pour_warnings
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
-from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finish, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
@@ -101,24 +100,9 @@ class Arrayed(Compound):
     def read(cls, path: Path) -> dict[str, Any]:
         return expand(read_toml(path), path.parent)
 
-    @classmethod
-    def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        return suggest_for_array(refusal, data)
-
-    @classmethod
-    def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:
-        return write_array_page(folder, warn)
-
-    @classmethod
-    def estimate(
-        cls,
-        names: Sequence[str],
-        sets: Sequence[str],
-        hertz: float | None,
-        details: bool,
-        as_json: bool,
-    ) -> None:
-        estimate_arrays(names, sets, hertz, details, as_json)
+    offered = staticmethod(suggest_for_array)
+    write_page = staticmethod(write_array_page)
+    estimate = staticmethod(estimate_arrays)
 
     def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
         return array_summary(self.of, folder, manifest, given)
@@ -286,7 +270,6 @@ def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[st
 def _procedure(
     moulds: PatchMoulds, volumes: Sequence[float], printed: float, units: Mapping[str, Product]
 ) -> Procedure:
-    """Return how the array is cast."""
     of_units = {}
     for folder, unit in unit_folders(moulds.array).items() if moulds.construction.own_tails else ():
         manifest, own = units[folder].manifest, MouldSet(unit, given=_given(moulds, unit))

@@ -143,16 +143,8 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
         else f"along the skin, unrolled: round the limb of radius {array.radius_mm:g} mm a distance is the arc, the "
         "shorter way round; the decay is that of flat skin",
         "places": [
-            {
-                "name": place.name,
-                "x_mm": place.x,
-                "y_mm": place.y,
-                "unit": place.unit.name,
-                "diameter_mm": place.unit.diameter_mm,
-                "drive": own.drive,
-                "frequency_hz": own.frequency.middle,
-            }
-            for place, own in zip(array.places, (units.inputs[kind] for kind in units.kind), strict=True)
+            {"name": name, "drive": own.drive, "frequency_hz": own.frequency.middle}
+            for name, own in zip(names, (units.inputs[kind] for kind in units.kind), strict=True)
         ],
         "nearest": nearest
         and {
@@ -454,12 +446,10 @@ def _colour(share: float) -> str:
 
 
 def _ink(share: float) -> str:
-    """Return the text's colour on the colour of a share."""
     return "#ffffff" if share > 0.55 else _INK
 
 
 def _scale(x: float, y: float, length: float, high: float) -> list[str]:
-    """Draw the scale of colours, in per cent."""
     part = length / STEPS
     bars = [
         f'<rect x="{coord(x)}" y="{coord(y + length - (i + 1) * part)}" width="14" height="{coord(part + 0.3)}" '

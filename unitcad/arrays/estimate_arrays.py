@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ from rich.text import Text
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_command import assumed_line, checks_line, to_open
@@ -38,20 +36,11 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
-        yield from _more_cavities(array)
     yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from json.loads(crosstalk.read_bytes())["answer"][:2]
     yield from to_open(folder)
-
-
-def _more_cavities(array: Array) -> Iterator[str]:
-    """Say that units which are cast one by one may be cast together."""
-    held = Counter(array.units.index(place.unit) for place in array.places)
-    for i, count in held.items() if construction_of(array.construction, array.cast).own_tails else ():
-        if array.units[i].moulds.cavities == (1, 1) and count > 1:
-            yield f"{count} units one after the other in one cavity: [moulds] cavities = [2, 2] casts four at once"
 
 
 _MOST_PLACES, _MOST_PAIRS = 64, 16

@@ -23,6 +23,7 @@ from unitcad.designs.limits import down, up
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point as PlanePoint
 from unitcad.moulds.cuts import Feature
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.shape import Extrude, Profile, Shape, cut, cylinder, mm, moved, polygon, ring, rotated, turned
 from unitcad.spec import Spec
 
@@ -58,6 +59,18 @@ def slot_profile(box: Box) -> Profile:
     if y1 - y0 >= x1 - x0:
         return Profile(((x0, y0 + r, 1.0), (x1, y0 + r, 0.0), (x1, y1 - r, 1.0), (x0, y1 - r, 0.0)))
     return Profile(((x0 + r, y0, 0.0), (x1 - r, y0, 1.0), (x1 - r, y1, 0.0), (x0 + r, y1, 1.0)))
+
+
+def draw_sheet(sheet: Sheet, low: float, high: float) -> Extrude:
+    """Draw a sheet from z to z, without its strap slots."""
+    return Extrude(rounded(sheet.outline, sheet.corner_mm), low, high, tuple(map(slot_profile, sheet.strap_slots)))
+
+
+def draw_groove(sheet: Sheet, spec: Spec, rim: float) -> Extrude:
+    """Draw the overflow groove round a sheet, in a tool whose rim is at that height, mm."""
+    land, width = spec.moulds.land_mm, spec.moulds.groove_width_mm
+    inner, outer = (rounded(sheet.outline, sheet.corner_mm, by) for by in (land, land + width))
+    return Extrude(outer, rim - groove_depth_of(spec, rim), rim + BEYOND, (inner,))
 
 
 BESIDE_SLOT = 2.0

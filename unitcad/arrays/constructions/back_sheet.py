@@ -27,7 +27,7 @@ from unitcad.arrays.piece_seams import (
     sheet_mm2,
     too_much,
 )
-from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile, stopped_ring
+from unitcad.arrays.sheet import bent_stretches, draw_groove, draw_sheet, stopped_ring
 from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import ADHESIVE, BEYOND, Cell, Fitting, Layout, bond
@@ -318,9 +318,7 @@ def _cup(drawing: Drawing, layer: int, *, last: bool) -> Shape:
     rim = dims.heights[layer]
     tools = [*_bores(drawing, layer, last=last), *_slots(drawing), *pin_holes(drawing.pins)]
     if last:
-        land, depth = spec.moulds.land_mm, groove_depth_of(spec, rim)
-        around = rounded(sheet.outline, sheet.corner_mm, land + spec.moulds.groove_width_mm)
-        tools.append(Extrude(around, rim - depth, rim + BEYOND, (rounded(sheet.outline, sheet.corner_mm, land),)))
+        tools.append(draw_groove(sheet, spec, rim))
     else:
         tools += _grooves(drawing, layer)
     return cut(Extrude(outline(lay.cup, MARK), 0.0, rim), tools)
@@ -333,8 +331,7 @@ def _bores(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
     top = sheet.low + (rim - sheet.low) / 2 if last else rim + BEYOND
     shapes = [moved(cylinder(dims.radii[layer], -BEYOND, top), cell.x, cell.y) for cell in drawing.lay.cells]
     if last:
-        posts = tuple(slot_profile(slot) for slot in sheet.strap_slots)
-        shapes.append(Extrude(rounded(sheet.outline, sheet.corner_mm), sheet.low, rim + BEYOND, posts))
+        shapes.append(draw_sheet(sheet, sheet.low, rim + BEYOND))
     return shapes
 
 
@@ -577,8 +574,7 @@ def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
         tuple(cut(moved(shape, place.x, place.y), own) for place, own in zip(array.places, notches, strict=True))
         for shape in drawn
     ]
-    holes = tuple(slot_profile(slot) for slot in sheet.strap_slots)
-    back = Extrude(rounded(sheet.outline, sheet.corner_mm), sheet.low, sheet.high, holes)
+    back: Shape = draw_sheet(sheet, sheet.low, sheet.high)
     if len(drawn) > 1 and sheet.low < dims.heights[-2]:
         inner = [moved(cylinder(dims.radii[-2], -BEYOND, dims.heights[-2]), p.x, p.y) for p in array.places]
         back = cut(back, inner)
