@@ -81,27 +81,16 @@ def estimate_arrays(
 
 
 def _print_details(data: Mapping[str, Any]) -> None:
-    names = [place["name"] for place in data["places"]]
+    names, sums, matrix = [place["name"] for place in data["places"]], data["sums"], data["matrix"]
     if len(names) <= _MOST_PLACES:
-        print_table(_sums(data, names), f"sum of all other units there, times one unit's edge level: {_HOW}")
+        each = zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
+        rows = [{"unit": name, "root": number(root, 2), "sum": number(total, 2)} for name, root, total in each]
+        print_table(rows, f"sum of all other units there, times one unit's edge level: {_HOW}")
     if 1 < len(names) <= _MOST_PAIRS:
-        print_table(_matrix(data, names), "% of a unit's motion at its edge that reaches the middle of another")
+        shares = [["-" if value is None else number(100 * value, 2) for value in row] for row in matrix]
+        rows = [
+            dict(zip(("drives", *names), (name, *row), strict=True)) for name, row in zip(names, shares, strict=True)
+        ]
+        print_table(rows, "% of a unit's motion at its edge that reaches the middle of another")
     ranges = f"In brackets: {data['range']}."
     print_indented(ranges, *data["assumptions"], f"Distances are {data['distances']}.")
-
-
-def _sums(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
-    """Tabulate the amplitude at each unit from all others."""
-    sums = data["sums"]
-    return [
-        {"unit": name, "root": number(root, 2), "sum": number(total, 2)}
-        for name, root, total in zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
-    ]
-
-
-def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
-    """Tabulate the decay between each two units."""
-    return [
-        {"drives": name, **{to: "-" if v is None else number(100 * v, 2) for to, v in zip(names, row, strict=True)}}
-        for name, row in zip(names, data["matrix"], strict=True)
-    ]

@@ -186,23 +186,17 @@ def _more_pins(drawn: Drawing) -> list[Point]:
 
 
 def _beside_slots(drawn: Drawing, side: Side, middles: Sequence[float], within: Interval, count: int) -> list[float]:
-    """Return the places of pins on a side, as `_spots`, clear of its pry slots: at units' middles if possible."""
+    """Return places of pins on a side, spread evenly and clear of its pry slots: at units' middles if possible."""
     by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
     slots = [slot.middle for slot in drawn.pry if slot.side == side]
     steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
-    for tried in (middles, (*steps, *(at + sign * by for at in slots for sign in (-1, 1)))):
-        found = _spots([at for at in tried if all(abs(at - slot) >= by - 1e-9 for slot in slots)], within, count)
-        if found:
-            return found
-    return []
-
-
-def _spots(middles: Sequence[float], within: Interval, count: int) -> list[float]:
-    """Return as many units' middles as asked for, the nearest to places spread evenly within an interval."""
     low, high = within[0] + 2 * PIN_RADIUS, within[1] - 2 * PIN_RADIUS
-    inside = [middle for middle in middles if low < middle < high]
     wanted = [low + (high - low) * (2 * k + 1) / (2 * count) for k in range(count)]
-    return sorted({min(inside, key=lambda middle, at=at: abs(middle - at)) for at in wanted}) if inside else []
+    for tried in (middles, (*steps, *(at + sign * by for at in slots for sign in (-1, 1)))):
+        free = [at for at in tried if low < at < high and all(abs(at - slot) >= by - 1e-9 for slot in slots)]
+        if free:
+            return sorted({min(free, key=lambda at, place=place: abs(at - place)) for place in wanted})
+    return []
 
 
 UP, DOWN = (0, 0, 1), (0, 0, -1)
