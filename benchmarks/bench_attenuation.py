@@ -153,7 +153,7 @@ def crosstalk_of_arrays(rounds: int) -> None:
         variant, distances = units.inputs[0], units.centre
         jobs: dict[str, Callable[[], object]] = {
             "crosstalk, whole": lambda array=array: crosstalk(array),
-            "matrix, one radial response": lambda units=units: units.both("flat"),
+            "matrix, one radial response": lambda units=units: units.both(),
             f"{SINGLE} pairs alone": lambda variant=variant, far=distances: [
                 decay(variant, np.array([1e-3 * r])) for r in far[0, 1 : SINGLE + 1]
             ],

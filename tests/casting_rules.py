@@ -3,7 +3,6 @@
 import re
 
 from unitcad.casting.pouring import LEVEL_AGAIN, TACK
-from unitcad.text import spaced
 
 WORDS = {
     r"\bknife": "sharp knife",
@@ -45,28 +44,27 @@ def broken_rules(procedure):
 
 
 def _agent(procedure):
-    """Keep release agent off what bonds later, and off every pour but the last."""
-    bonds = {bond.face: bond.to for bond in procedure.bonds}
+    """Keep release agent off what bonds later: at most the last cup's bore gets some, and every cup's step says so."""
     last = procedure.pours[-1].index
     for pour in procedure.pours:
-        for face in pour.agent:
-            if face in bonds:
-                bond = f"whose cast bonds to {bonds[face]}"
-                yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, {bond}"
-            if pour.index != last:
-                yield f"pour {pour.index}: release agent before the last pour"
-            if face.tool != f"cup{last}" or face.face != "bore":
-                yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, not on the last cup's bore"
+        for step in pour.steps:
+            if said := re.search(r"Release agent, if any, [^.]*only on ([^.]*), away from", step.text):
+                if pour.index != last:
+                    yield f"pour {pour.index}: release agent before the last pour"
+                if said[1] not in (f"the bore of cup {last}", f"the sheet's bed and the bores of cup {last}"):
+                    yield f"pour {pour.index}: release agent on {said[1]}, not on the last cup's bore"
+            if re.fullmatch(r"Cup \d+ on", step.title) and "release agent" not in step.text.lower():
+                yield f"pour {pour.index}: says nothing of release agent"
 
 
 def _degassing(procedure):
     """Degas every pour where there is a vacuum; ask for nothing that needs one where there is none."""
     for pour in procedure.pours:
-        says = any(step.text.startswith("Degas for") for step in pour.steps)
-        if procedure.vacuum and not (says and pour.degassing_min > 0):
+        says = any(step.text.startswith("Degas for") and step.minutes > 0 for step in pour.steps)
+        if procedure.vacuum and not says:
             yield f"pour {pour.index}: not degassed, though there is a vacuum"
         needs = [figure.name for figure in pour.figures if "vacuum" in figure.name or "degassing" in figure.name]
-        if not procedure.vacuum and (says or pour.degassing_min or needs):
+        if not procedure.vacuum and (says or needs):
             yield f"pour {pour.index}: asks for a vacuum that is not there: {', '.join(needs) or 'degassing'}"
     needs = [item.item for item in procedure.bill if "degassing" in item.item or "vacuum" in item.note]
     if needs and not procedure.vacuum:
@@ -107,11 +105,12 @@ def _lifted(procedure):
 
 
 def _cleared(procedure):
-    """Clear every window that resin may close, before the post-cure."""
+    """Clear every window for a tongue that resin may close, before the post-cure."""
     clear, cure = _first(procedure.preparation, "Clear the windows"), _first(procedure.preparation, "post-cure, bake")
-    for cup in procedure.tunnels:
-        if clear is None or cure is None or clear > cure or spaced(cup) not in procedure.preparation[clear].text:
-            yield f"the window of {cup} is not cleared of resin before the post-cure"
+    windows = [pour.index for pour in procedure.pours if _titled(pour.steps, "Tongue in, grease") is not None]
+    for cup in windows if cure is not None else ():
+        if clear is None or clear > cure or f"cup {cup}" not in procedure.preparation[clear].text:
+            yield f"the window of cup {cup} is not cleared of resin before the post-cure"
 
 
 def _shown(procedure):

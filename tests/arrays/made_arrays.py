@@ -39,7 +39,7 @@ def with_tool(moulds, name, change):
     """The moulds with one tool drawn otherwise."""
     plan = moulds.plan
     tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
-    return patch_moulds(moulds.arranged, replace(plan, tools=tools))
+    return patch_moulds(moulds.array, replace(plan, tools=tools))
 
 
 def less(*tools):

@@ -43,9 +43,9 @@ def test_a_unit_by_name_is_changed_by_paths(changes):
 
 def test_a_place_takes_like_too():
     whole = load_array("hex-19", ['place=[{at="A1", unit={like="encapsulating", diameter_mm=13}}]'])
-    assert whole.placed("A1").unit.diameter_mm == 13
+    assert whole.places[0].unit.diameter_mm == 13
     parts = ["place.0.unit.diameter_mm=13", 'place=[{at="A1"}]', "place.0.unit.like=encapsulating"]
-    assert load_array("hex-19", parts).placed("A1").unit == whole.placed("A1").unit
+    assert load_array("hex-19", parts).places[0].unit == whole.places[0].unit
 
 
 @pytest.mark.parametrize(

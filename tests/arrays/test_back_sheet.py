@@ -18,7 +18,7 @@ def test_the_silicone_has_the_volume_of_its_lengths():
     """Twelve notches, 3.4 wide and 2.11 high, in nine rings; the sheet 76 x 60 x 1.25, corners of 10, two slots."""
     moulds = made("forearm-patch")
     layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
-    drawn = moulds.arranged.sheet
+    drawn = moulds.array.sheet
     slots = 2 * (3 * 23 + math.pi * 1.5**2)
     sheet = (76 * 60 - (4 - math.pi) * drawn.corner_mm**2 - slots) * 1.25
     rings = 9 * math.pi * (7**2 - 5.75**2) * 3.36 - 12 * notch(5.75, 7) * 2.11
@@ -65,7 +65,7 @@ def test_an_impossible_order_is_caught():
         last.removals[:1] + last.removals[-2:] + last.removals[1:-2],
     ):
         steps = (*plan.steps[:-1], replace(last, removals=order))
-        found = mould_checks()["C300"].findings(patch_moulds(moulds.arranged, replace(plan, steps=steps)))
+        found = mould_checks()["C300"].findings(patch_moulds(moulds.array, replace(plan, steps=steps)))
         assert not all(f.ok for f in found)
 
 

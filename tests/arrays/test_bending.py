@@ -39,14 +39,14 @@ def test_strains_and_sagitta_are_those_of_the_geometry():
     radius = (pitch - 14) / (2 * math.pi / 8)
     assert bent.strain_between == pytest.approx(1.25 / 2 / radius, rel=1e-3)
     assert math.hypot(40 - bent.sagitta, 7) == pytest.approx(40)
-    assert patch_moulds(array).plan.stretches == (("sheet bent round 40 mm", pytest.approx(100 * bent.most)),)
+    assert patch_moulds(array).plan.stretches == (("sheet bent round 40 mm", pytest.approx(100 * bent.strain_between)),)
     assert bending(load_array("forearm-patch")) is None
 
 
 def test_the_bent_sheet_has_the_flat_ones_volume():
     """Pappus: round its own middle a plate keeps its volume. The ends meet but for what is left between them."""
     moulds = made("wrist-band")
-    array, drawn = moulds.arranged, moulds.arranged.sheet
+    array, drawn = moulds.array, moulds.array.sheet
     x0, y0, x1, y1 = drawn.outline
     plate = realise(box(x0, x1, y0, y1, drawn.low, drawn.high), 24)
     vertices, faces = bent_mesh(array, plate)

@@ -42,7 +42,7 @@ ARRAYS = {name: made(name) for name in LAYOUTS}
 
 def _away(laid, at):
     """The distance of points from pads and strips, by the definitions of a disc and of a rectangle."""
-    found = [np.hypot(at[:, 0] - pad.x, at[:, 1] - pad.y) - pad.radius for pad in laid.pads]
+    found = [np.hypot(at[:, 0] - pad.x, at[:, 1] - pad.y) - laid.pad.radius for pad in laid.places]
     for strip in laid.strips:
         (x0, y0), (x1, y1) = strip.start, strip.end
         length = math.hypot(x1 - x0, y1 - y0)
@@ -77,7 +77,7 @@ def test_the_outline_holds_pads_and_strips_and_rounds_what_lies_between(name):
     rng = np.random.default_rng(1)
     at = rng.uniform((x0, y0), (x1, y1), (500, 2))
     # Most of them next to where strips and pads meet.
-    near = np.array([(pad.x, pad.y) for pad in laid.pads])[rng.integers(0, len(laid.pads), 4000)]
+    near = np.array([(pad.x, pad.y) for pad in laid.places])[rng.integers(0, len(laid.places), 4000)]
     at = np.concatenate([at, near + rng.normal(0, 5, near.shape)])
     away, inside = _away(laid, at), _inside(drawn, at)
     assert np.all(inside[away < -5e-3])
@@ -115,9 +115,9 @@ def test_the_dxf_holds_the_outline_exactly_and_has_the_same_bytes_again():
     back = Profile(tuple((x, y, bulge) for x, y, bulge in line.get_points("xyb")))
     assert back.area == pytest.approx(drawn.area, rel=1e-9)
     assert [(e.dxf.center.x, e.dxf.center.y, e.dxf.radius) for e in space.query("CIRCLE")] == [
-        pytest.approx((pad.x, pad.y, pad.radius), abs=1e-6) for pad in laid.pads
+        pytest.approx((pad.x, pad.y, laid.pad.radius), abs=1e-6) for pad in laid.places
     ]
-    assert [e.dxf.text for e in space.query("TEXT")] == [pad.name for pad in laid.pads]
+    assert [e.dxf.text for e in space.query("TEXT")] == [pad.name for pad in laid.places]
     time.sleep(1.1)
     assert circuit_dxf(wiring(made("hexagon")), outline(made("hexagon"))) == data
     assert not ezdxf.options.write_fixed_meta_data_for_testing

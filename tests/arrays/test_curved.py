@@ -25,7 +25,7 @@ def test_the_silicone_has_the_volume_of_its_lengths():
     """A barrel 1.25 thick and 60 long with corners of 10; what each unit adds under it, summed over its foot."""
     moulds = sleeve()
     layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
-    sheet = moulds.arranged.sheet
+    sheet = moulds.array.sheet
     low, back = R + sheet.low, R + sheet.high
     assert back == pytest.approx(math.hypot(R + 4.61, 5.75), abs=1 / 1024)
     turn = 60 / (R + (sheet.low + sheet.high) / 2)
@@ -60,9 +60,9 @@ def test_the_silicone_has_the_volume_of_its_lengths():
 def test_each_unit_stands_where_its_arc_is():
     """The middle of its foot touches the limb, at the angle that its place has on the sheet's middle."""
     moulds = sleeve()
-    middle = R + (moulds.arranged.sheet.low + moulds.arranged.sheet.high) / 2
+    middle = R + (moulds.array.sheet.low + moulds.array.sheet.high) / 2
     motors = {body.name: moulds.mesh(body) for body in moulds.laid_later if body.kind == "motor"}
-    for place in moulds.arranged.places:
+    for place in moulds.array.places:
         x0, y0, z0, x1, y1, z1 = motors[f"{place.name}-motor"].bounding_box()
         x, y, z = (x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2 + R
         assert math.atan2(x, z) == pytest.approx(place.x / middle, abs=1e-9)
@@ -111,7 +111,7 @@ def test_a_wrong_axis_or_an_impossible_order_is_caught():
     ):
         steps = [first, last]
         steps[index] = replace(steps[index], removals=removals)
-        found = mould_checks()["C300"].findings(patch_moulds(pair().arranged, replace(plan, steps=tuple(steps))))
+        found = mould_checks()["C300"].findings(patch_moulds(pair().array, replace(plan, steps=tuple(steps))))
         assert any(caught in f.where for f in found if not f.ok), caught
 
 
@@ -119,7 +119,7 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap():
     plan = pair().plan
     first, last = plan.steps
     swapped = replace(last, earlier=(rotated(last.earlier[0], "y", 0.5), *last.earlier[1:]))
-    moulds = patch_moulds(pair().arranged, replace(plan, steps=(first, swapped)))
+    moulds = patch_moulds(pair().array, replace(plan, steps=(first, swapped)))
     assert any("layer1 laid in" in f.where for f in mould_checks()["C200"].findings(moulds) if not f.ok)
 
 
@@ -138,7 +138,7 @@ def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(procedure)
     assert [step.title for step in procedure.release] == ["Filament out", "Peel off"]
     assert procedure.time_line[-1].name == "motors and circuit in"
     # What is cast flat bonds later.
-    assert all(pour.agent == () for pour in procedure.pours)
+    assert not any("Release agent, if any" in step.text for pour in procedure.pours for step in pour.steps)
     assert "No release agent" in next(step.text for step in procedure.pours[0].steps if step.title == "Cup 1 on")
 
 

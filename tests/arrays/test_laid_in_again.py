@@ -18,7 +18,7 @@ def patch():
 
 
 def with_steps(*steps):
-    return patch_moulds(patch().arranged, replace(patch().plan, steps=steps))
+    return patch_moulds(patch().array, replace(patch().plan, steps=steps))
 
 
 def test_a_layer_is_laid_in_elsewhere_only_once_it_was_taken_out():

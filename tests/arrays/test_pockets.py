@@ -68,7 +68,7 @@ def test_a_tail_that_leaves_at_the_sheet_is_refused():
 def test_units_that_meet_each_other_or_the_sheet_are_caught():
     """A tail turned into a neighbour, and lugs that no refusal kept out: 12 by 4 by 1.5 mm through the sheet."""
     array = load_array("forearm-pockets")
-    turned = replace(array, places=(replace(array.placed("A1"), angle_deg=0.0), *array.places[1:]))
+    turned = replace(array, places=(replace(array.places[0], angle_deg=0.0), *array.places[1:]))
     assert {f.where for f in overlap.findings(patch_moulds(turned)) if not f.ok} == {"unit: A1 and A2"}
     array = load_array(_of("encapsulating"))
     lugs = replace(array, places=tuple(replace(place, unit=load("custom/strap-lugs")) for place in array.places))

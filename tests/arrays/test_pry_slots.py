@@ -71,7 +71,7 @@ def test_marks_of_pieces_keep_clear_of_slots():
     """The middle piece has room for its number alone. No face of a mark is open to a slot."""
     moulds = three()
     lay = moulds.plan.layout
-    drawn = drawing_of(moulds.arranged)
+    drawn = drawing_of(moulds.array)
     letters = moulds.meshes([union(tuple(_base_letters(drawn, "B62A6")))])[0]
     assert len(letters.decompose()) == 6 + 1 + 6
     for slot in drawn.pry:

@@ -46,7 +46,7 @@ def test_no_seam_of_a_cup_lies_over_one_of_the_base(name):
 
 def test_a_hexagons_seams_keep_clear_of_its_cores():
     """The distance of every core from line and teeth, measured on the corners."""
-    array = made("hexagon, y").arranged
+    array = made("hexagon, y").array
     (each,) = made("hexagon, y").plan.splits
     for seam in each.seams:
         assert seam.teeth
@@ -61,11 +61,11 @@ def test_the_silicone_in_the_seams_is_what_c250_measures(name):
     """What is refused by lengths and heights, and what is measured on meshes."""
     moulds = made(name)
     (*_, found) = (f for f in mould_checks()["C250"].findings(moulds) if "silicone" in f.where)
-    tool, sheet = moulds.plan.splits[-1], moulds.arranged.sheet
+    tool, sheet = moulds.plan.splits[-1], moulds.array.sheet
     x0, y0, _, x1, y1, _ = bounds(moulds.solids[tool.tool])
     plate, rim = moulds.spec.moulds.plate_mm, moulds.plan.steps[-1].rim
     heights = (plate, plate + rim) if moulds.construction.own_tails else (sheet.low, rim)
-    assert weep(moulds.arranged, tool.seams, (x0, y0, x1, y1), heights) == pytest.approx(found.value, rel=0.03)
+    assert weep(moulds.array, tool.seams, (x0, y0, x1, y1), heights) == pytest.approx(found.value, rel=0.03)
 
 
 def test_tools_larger_than_the_bed_along_both_axes_are_refused_with_the_bed_that_one_cut_needs():

@@ -43,7 +43,7 @@ def test_a_faulty_seam_is_caught(where, what, play, change):
     drawn = split(plan.tool("cup2"), [replace(seam, play=play) for seam in sound.seams])
     pieces = (drawn.pieces[0], replace(drawn.pieces[1], shape=change(drawn.pieces[1].shape)))
     faulty = replace(plan, splits=(*plan.splits[:-1], replace(drawn, pieces=pieces)))
-    found = [f.where for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if not f.ok]
+    found = [f.where for f in mould_checks()["C250"].findings(patch_moulds(band().array, faulty)) if not f.ok]
     assert any(where in each for each in found), (what, found)
 
 
@@ -58,7 +58,7 @@ def test_what_pieces_have_beyond_their_tool_is_a_burr_and_no_overlap_of_theirs()
         (lambda shape: shape, 0.0),
     ):
         pieces = first, replace(second, shape=change(second.shape)), *rest
-        faulty = patch_moulds(band().arranged, replace(plan, splits=(replace(sound, pieces=pieces),)))
+        faulty = patch_moulds(band().array, replace(plan, splits=(replace(sound, pieces=pieces),)))
         found = [f.value for f in mould_checks()["C250"].findings(faulty) if "beyond it" in f.where]
         assert found == [pytest.approx(beyond, abs=1e-6)]
 
@@ -78,7 +78,7 @@ def test_too_many_seams_weep_too_much():
     drawn = [Seam(x, x, (Tooth(x, sound.teeth[0].y),), sound.play) for x in range(-15, 45, 10)]
     many = split(plan.tool("cup2"), drawn)
     faulty = replace(plan, splits=(*plan.splits[:-1], many))
-    found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if "silicone" in f.where]
+    found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().array, faulty)) if "silicone" in f.where]
     assert [f.ok for f in found] == [True, False]
 
 

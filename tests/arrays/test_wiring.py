@@ -26,11 +26,11 @@ def over(array, *sets):
 
 def test_nine_units_have_three_rows_and_a_spine_between_two_columns():
     found = wiring(nine())
-    assert [pad.name for pad in found.pads] == [f"{row}{column}" for row in "ABC" for column in (1, 2, 3)]
+    assert [place.name for place in found.places] == [f"{row}{column}" for row in "ABC" for column in (1, 2, 3)]
     assert [(row.start, row.end) for row in found.rows] == [((-20, y), (20, y)) for y in (20, 0, -20)]
     (spine,) = found.spine
     assert (spine.start, spine.end) == ((10, 21.5), (10, nine().sheet.outline[1] - 10))
-    assert found.thickness == pytest.approx(0.11)
+    assert found.pad.high - found.pad.low == pytest.approx(0.11)
 
 
 def test_a_spine_is_laid_where_it_is_asked_for():
@@ -85,6 +85,6 @@ def test_a_narrow_limb_bends_the_circuit_between_two_pads_too_much():
     with pytest.raises(Refusal, match="bent") as refused:
         wiring(array)
     assert refused.value.field == "limb.radius_mm"
-    pad = wiring(nine(unit=thick, layout=close)).pads[0].radius
+    pad = wiring(nine(unit=thick, layout=close)).pad.radius
     assert refused.value.nearest == pytest.approx(LEAST_BEND * 0.6 * 18 / (18 - 2 * pad), abs=1e-3)
     wiring(over(array, f"limb.radius_mm={refused.value.nearest}"))

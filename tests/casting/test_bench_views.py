@@ -9,7 +9,7 @@ from PIL import Image
 
 from unitcad.casting.drawings import ARROW, BAND, CARD, TAPE, tongue_prop
 from unitcad.casting.procedure import procedure
-from unitcad.casting.views import SIZE, View, picture_path, pictures, views
+from unitcad.casting.views import SIZE, BenchPictures, View, picture_path, views
 from unitcad.export.raster import Surface, aim, finish, render
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
@@ -93,6 +93,11 @@ def hues(content, colour):
     own = np.array(colour) / np.linalg.norm(colour)
     bright = np.linalg.norm(pixels, axis=1)
     return int((((pixels @ own) > 0.9995 * bright) & (bright > 60)).sum())
+
+
+def pictures(moulds):
+    bench = BenchPictures(moulds)
+    return {picture_path(name): bench.picture(name) for name in bench.names}
 
 
 def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte():

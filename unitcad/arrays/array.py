@@ -124,10 +124,6 @@ class Array:
         """Return the paths at which `asked` has a unit: "unit." first, if it is the array's own, then its places."""
         return tuple(f"{path}." for path, table in units_in(self.asked).items() if table == to_data(unit))
 
-    def placed(self, name: str) -> Placed:
-        """Return the place of that name. Raises KeyError."""
-        return {place.name: place for place in self.places}[name]
-
     def __repr__(self) -> str:
         return f"Array({self.name!r}: {self.construction}, {len(self.places)} units of {self.unit.diameter_mm:g} mm)"
 

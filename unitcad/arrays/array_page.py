@@ -40,20 +40,8 @@ BELOW = 14.0
 """Distance by which inserted parts are drawn out of a sheet, towards the skin, mm."""
 
 
-def array_model(array: Array) -> dict[str, Any]:
-    """Return an array for the page in the form of `page.model`: the patch; tools with their silicone.
-
-    Raises UnitcadError if the tools can't be made any more.
-    """
-    model = {**patch_model(array), **tools_model(array)}
-    return model | {key: compress(model[key]) for key in ("unit", "moulds")}
-
-
 def patch_model(array: Array) -> dict[str, Any]:
-    """Return the patch for the viewer, its GLB file as bytes; a body at several places is there once.
-
-    Lengths in mm.
-    """
+    """Return the patch in the form of `page.model`, its GLB file as bytes; a body at several places is there once."""
     parts = _by_kind(patch_parts(array))
     shared = {part.name for part in parts if part.body.made == "cast" and not part.places}
     return {
@@ -121,7 +109,6 @@ def tools_model(array: Array) -> dict[str, Any]:
     }
 
 
-CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg"), "circuit.svg"
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
 SIDES = ("skin-side", "bent", "back")
@@ -156,8 +143,12 @@ def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
 
 
 def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
-    shown = _Shown(folder, warn)
-    array, model, drawn = manifest["array"], _model(folder, warn), [Path(path).name for path in manifest["pictures"]]
+    crosstalk, casting = (_read(folder / name, warn, _table_in) or {} for name in ("crosstalk.json", "casting.json"))
+    array, model, drawn = manifest["array"], _model(folder, warn), manifest["pictures"]
+
+    def figures(*paths: str) -> list[str]:
+        return [_figure(folder / path, warn) for path in paths]
+
     parts = [
         '<div class="top"><div>',
         f"<h1>{escape(manifest['name'])}</h1>",
@@ -166,11 +157,11 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         "</div></div>",
         *_section("3D", [VIEW if model else ""]),
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
-        *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
-        *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
-        *_section("Tools", [shown.of(f"pictures/{name}") for name in drawn if not name.startswith("patch-")]),
-        *_section("Circuit", [shown.of(CIRCUIT)]),
-        *_section("Casting", list(_casting(folder, shown.json("casting.json")))),
+        *_section("Patch", [*figures(*(f"pictures/patch-{side}.png" for side in SIDES)), _worn(array)]),
+        *_section("Crosstalk", [_answer(crosstalk), *figures("crosstalk-patch.svg", "crosstalk.svg")]),
+        *_section("Tools", figures(*(path for path in drawn if "/patch-" not in path))),
+        *_section("Circuit", figures("circuit.svg")),
+        *_section("Casting", list(_casting(folder, casting))),
         *_section("Units", [_units(folder, manifest)]),
         *_section("Places", [_places(array)]),
         *_section("Checks", [_checks(manifest)]),
@@ -182,42 +173,40 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
 def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
     """Return what the 3D view shows; None, and a warning, if it can't be made, as of a unit that runs code."""
     try:
-        return array_model(array_of(read_toml(folder / ARRAY_FILE, links=False)))
+        array = array_of(read_toml(folder / ARRAY_FILE, links=False))
+        model = {**patch_model(array), **tools_model(array)}
     except UnitcadError as error:
         warn(f"warning: no 3D view: {error}")
         return None
+    return model | {key: compress(model[key]) for key in ("unit", "moulds")}
 
 
-class _Shown:
-    """Files of a folder for the page; a missing one shows nothing, a damaged one a warning."""
+def _read(path: Path, warn: Callable[[str], None], reader: Callable[[Path], Any]) -> Any:
+    """Return what a reader makes of a file; None for a missing file, with a warning for a damaged one."""
+    try:
+        return reader(path)
+    except files.NotThere:
+        return None
+    except UnitcadError as error:
+        warn(f"warning: {error}")
+        return None
 
-    def __init__(self, folder: Path, warn: Callable[[str], None]) -> None:
-        self.folder, self.warn = folder, warn
 
-    def of(self, path: str) -> str:
-        """Return a drawing or picture with its caption."""
-        try:
-            content = files.read(self.folder / path, largest=LARGEST, links=False)
-        except files.NotThere:
-            return ""
-        except UnitcadError as error:
-            self.warn(f"warning: {error}")
-            return ""
-        words = WORDS.get(Path(path).name) or f"Pour {Path(path).stem.removeprefix('pour')}, cut open"
-        image = drawing(content.decode("utf-8", "replace"), words) if path.endswith(".svg") else picture(content, words)
-        return f"<figure>{image}<figcaption>{escape(words)}</figcaption></figure>"
+def _figure(path: Path, warn: Callable[[str], None]) -> str:
+    """Return a drawing or picture with its caption."""
+    content = _read(path, warn, partial(files.read, largest=LARGEST, links=False))
+    if content is None:
+        return ""
+    words = WORDS.get(path.name) or f"Pour {path.stem.removeprefix('pour')}, cut open"
+    is_svg = path.suffix == ".svg"
+    image = drawing(content.decode("utf-8", "replace"), words) if is_svg else picture(content, words)
+    return f"<figure>{image}<figcaption>{escape(words)}</figcaption></figure>"
 
-    def json(self, path: str) -> dict[str, Any]:
-        """Return a JSON file's table; empty without one."""
-        try:
-            data = files.read_json(self.folder / path, links=False)
-            expect(data, dict[str, Any], self.folder / path)
-            return data
-        except files.NotThere:
-            return {}
-        except UnitcadError as error:
-            self.warn(f"warning: {error}")
-            return {}
+
+def _table_in(path: Path) -> dict[str, Any]:
+    data = files.read_json(path, links=False)
+    expect(data, dict[str, Any], path)
+    return data
 
 
 def _line(array: Mapping[str, Any]) -> str:
@@ -364,13 +353,10 @@ def bent(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
         vertices, faces = arrays(solid)
         return np.asarray(vertices, float) + np.array([0.0, 0.0, radius]), np.asarray(faces, np.int64)
     vertices, faces = arrays(solid.refine_to_length(FINEST))
-    return bend_points(np.asarray(vertices, float), radius, middle), np.asarray(faces, np.int64)
-
-
-def bend_points(points: np.ndarray, radius: float, middle: float) -> np.ndarray:
-    """Return points (n, 3) of the flat frame, bent around a limb (mm)."""
+    points = np.asarray(vertices, float)
     angle, distance = points[:, 0] / middle, radius + points[:, 2]
-    return np.column_stack([distance * np.sin(angle), points[:, 1], distance * np.cos(angle)])
+    around = np.column_stack([distance * np.sin(angle), points[:, 1], distance * np.cos(angle)])
+    return around, np.asarray(faces, np.int64)
 
 
 def limb(array: Array) -> Manifold:
@@ -399,11 +385,11 @@ def pictures(moulds: PatchMoulds) -> dict[str, Callable[[], bytes]]:
         return lambda: draw(list(surfaces()), eye, SIZE)
 
     def patch() -> Iterable[Surface]:
-        return (_solid(moulds, body) for body in patch_bodies(moulds.arranged))
+        return (_solid(moulds, body) for body in patch_bodies(moulds.array))
 
     apart = shown(ABOVE, lambda: (_solid(moulds, *moved) for moved in take_apart(moulds)))
     names = {"patch-skin-side": shown(SKIN_SIDE, patch), "patch-back": shown(BACK, patch), "tools": apart}
-    if moulds.arranged.radius_mm is not None:
+    if moulds.array.radius_mm is not None:
         names["patch-bent"] = shown(ALONG, partial(_worn_bodies, moulds))
     names |= {f"pour{s.index}": shown(ABOVE, partial(_cut_open, moulds, s)) for s in moulds.plan.steps}
     return {f"pictures/{name}.png": picture for name, picture in names.items()}
@@ -414,8 +400,7 @@ def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surfa
 
 
 def _worn_bodies(moulds: PatchMoulds) -> Iterator[Surface]:
-    """Yield the limb, and the patch's bodies around it."""
-    array = moulds.arranged
+    array = moulds.array
     yield Surface(*arrays(limb(array)), SKIN)
     for body in patch_bodies(array):
         yield Surface(*bent(array, moulds.mesh(body)), body.colour)
@@ -467,7 +452,7 @@ def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
 
 def _cut_open(moulds: PatchMoulds, step: Step) -> Iterator[Surface]:
     """Yield a pour as it is struck off, without its nearer half: cut through a row of units."""
-    y = min((place.y for place in moulds.arranged.places), key=abs) + 1 / 512
+    y = min((place.y for place in moulds.array.places), key=abs) + 1 / 512
     solids = [(moulds.solids[name], moulds.plan.tool(name).colour) for name in step.tools]
     colours = {body.step: body.colour for body in moulds.unit}
     for shapes, pour in ((step.earlier, 1), (step.layer, step.index)):

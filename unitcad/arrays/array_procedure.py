@@ -17,16 +17,8 @@ from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
 from unitcad.arrays.tails import covered_tails, named
 from unitcad.casting.bill import Item, bill, list_consumables, list_pieces, motor_name, mould_plates
-from unitcad.casting.figures import (
-    LAY_IN_MIN,
-    LIFT_MIN,
-    PEEL_MIN,
-    PULL_MIN,
-    Batch,
-)
+from unitcad.casting.figures import LAY_IN_MIN, LIFT_MIN, PEEL_MIN, PULL_MIN, Batch
 from unitcad.casting.pouring import (
-    BondFace,
-    Face,
     after_pours,
     cure,
     injection_steps,
@@ -43,27 +35,13 @@ from unitcad.casting.preparation import Printing, Size, cleaning, fall, joining,
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
 from unitcad.casting.troubles import troubles
-from unitcad.casting.views import picture_path, views
+from unitcad.casting.views import picture_path, pour_picture
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
 from unitcad.spec import Spec
 from unitcad.text import join_words, number, spaced
-
-
-def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
-    """Return the procedure of an array whose units are cast with the sheet: nothing is meshed or drawn.
-
-    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
-    """
-    made = procedure(moulds, layer_volumes_mm3, printed_mm3)
-    return replace(
-        made,
-        assembly=motors_in(made.assembly),
-        time_line=(*made.time_line[:-1], replace(made.time_line[-1], name="motors and circuit in")),
-        last="Motors and circuit in",
-    )
 
 
 def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
@@ -77,13 +55,10 @@ def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
 
 
 def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
-    """Return the procedure of an array that is cast round the limb: nothing is meshed or drawn.
-
-    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
-    """
+    """Return the procedure of an array that is cast round the limb; volumes as for `array_procedure`."""
     flat = moulds.cast_flat
     assert flat is not None
-    made, shown = procedure(flat, layer_volumes_mm3[:-1], printed_mm3), views(flat)
+    made = procedure(flat, layer_volumes_mm3[:-1], printed_mm3)
     spec, step = moulds.spec, moulds.plan.steps[-1]
     injected_spec = structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
     under_lid = PatchMoulds(injected_spec, moulds.plan, array=moulds.array)
@@ -95,48 +70,35 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         for each, silicone, volume in zip(flat.plan.steps, silicones[:-1], layer_volumes_mm3[:-1], strict=True)
     ]
     batch = Batch(under_lid, step, silicones[-1], layer_volumes_mm3[-1], 1)
-    flat_pours = tuple(
-        replace(each, agent=(), steps=tuple(pour_steps(of, shown)))
-        for each, of in zip(made.pours, flat_batches, strict=True)
-    )
+    flat_pours = tuple(pour_of(each, pour_steps(each)) for each in flat_batches)
     steps = (
         *_laid_in(moulds, flat, silicones[0]),
         *_lid_on(moulds, step),
         *mixing_steps(batch),
-        *injection_steps(batch, _picture(step, "inject")),
-        cure(batch, "the bead on a vent", "layer", _picture(step, "filled")),
+        *injection_steps(batch, pour_picture(step.index, "inject")),
+        cure(batch, "the bead on a vent", "layer", pour_picture(step.index, "filled")),
         _lid_off(moulds, step),
     )
     pours, prepared = (*flat_pours, pour_of(batch, steps)), (_sort_curved(moulds), *made.preparation[1:])
     out, together = tuple(_out_of_curved(moulds)), motors_in(tuple(motor_in(moulds, silicones)))
     every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
     grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
+    last = [tool for tool in moulds.plan.pieces if tool.step == step.index and tool.made == "printed"]
+    ends = [moulds.mesh(tool).bounding_box()[2::3] for tool in last]
     return replace(
         made,
         name=spec.name,
         label=moulds.plan.label,
         **times(prepared, pours, out, "motors and circuit in", together),
-        printing=printing(moulds, printed_mm3, _tallest(moulds)),
+        printing=printing(moulds, printed_mm3, max(high - low for low, high in ends)),
         preparation=prepared,
         pours=pours,
-        bonds=tuple(_bonds(moulds)),
         release=out,
         assembly=together,
         measure=tuple(_measure_curved(moulds, grams)),
         bill=tuple(_bill(moulds, [*flat_batches, batch], every)),
         last="Motors and circuit in",
     )
-
-
-def _picture(step: Step, name: str) -> str:
-    """Return the path of a view of the last pour."""
-    return picture_path(f"pour{step.index}-{name}")
-
-
-def _tallest(moulds: PatchMoulds) -> float:
-    """Return the height of base or lid of the last pour as it is printed, mm."""
-    last = [tool for tool in moulds.plan.pieces if tool.step == len(moulds.plan.steps) and tool.made == "printed"]
-    return max(high - low for low, high in (moulds.mesh(tool).bounding_box()[2::3] for tool in last))
 
 
 def _base(moulds: PatchMoulds) -> str:
@@ -159,7 +121,7 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
 
 def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
     """Return the steps by which the inner layers move from their flat base to the curved one."""
-    units, base, step = len(moulds.arranged.places), _base(moulds), moulds.plan.steps[-1]
+    units, base, step = len(moulds.array.places), _base(moulds), moulds.plan.steps[-1]
     lid = spaced(step.lid or "")
     cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
     pulled = next(iter(flat_release(flat, inner)))
@@ -177,7 +139,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Cut {units} straight filaments, {_lengths(moulds)} mm long. Push one up through each core of {base} from "
         f"below until it is flush with the underside. Put {base} on a flat board, so that none sinks. Trim the upper "
         "ends flush with the cores' tops.",
-        _picture(step, "filament"),
+        pour_picture(step.index, "filament"),
         minutes=3.0 * units,
         required_tools=("sharp knife",),
     )
@@ -200,14 +162,14 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Lay each over its core of {base}, A1 on A1, its notches over the fins. Press its edge down all round onto "
         "the moat's floor, its top flat on the core: silicone that creeps under it fills the cavity's mouth. No "
         "release agent, no grease on core or moat.",
-        _picture(step, "laid-in"),
+        pour_picture(step.index, "laid-in"),
         minutes=LAY_IN_MIN * units / 2,
     )
 
 
 def _lengths(moulds: PatchMoulds) -> str:
     """Return the lengths of the straight filaments, mm: along the unit's axis, from the core's top to the bench."""
-    array = moulds.arranged
+    array = moulds.array
     radius, middle = array.radius_mm or 0.0, array.middle_radius_mm or 1.0
     bottom = moulds.plan.tool(moulds.plan.base_of(moulds.plan.steps[-1])).shape
     low = moulds.mesh_of(bottom).bounding_box()[2]
@@ -226,11 +188,11 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
         f"Draw a thin line of petroleum jelly on the curved land of {base}, near its outer edge. Put {lid} on over the "
         "pins, which let it on one way only. Press it down until it bears on the land all round; at both ends a slit "
         f"of {slit} mm stays open.",
-        _picture(step, "lid-on"),
+        pour_picture(step.index, "lid-on"),
         minutes=LIFT_MIN,
         required_tools=("petroleum jelly",),
     )
-    yield lid_held(step, _picture(step, "lid-held"))
+    yield lid_held(step, pour_picture(step.index, "lid-held"))
 
 
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
@@ -239,7 +201,7 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
         "Remove its bands or clamp. Turn a screwdriver in the slit at either end, little by little, until "
         f"{spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents tear off. Trim them flush with a "
         "knife.",
-        _picture(step, "lid-off"),
+        pour_picture(step.index, "lid-off"),
         minutes=LIFT_MIN,
         required_tools=("sharp knife",),
     )
@@ -247,7 +209,7 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
 
 def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Describe the way from the cured sheet to a sleeve in the hand."""
-    units, base = len(moulds.arranged.places), _base(moulds)
+    units, base = len(moulds.array.places), _base(moulds)
     yield BenchStep(
         "Filament out",
         f"Lift the mould off the bench, lay {base} on its side. Take each filament with pliers in its pocket and pull "
@@ -266,18 +228,8 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
     )
 
 
-def _bonds(moulds: PatchMoulds) -> Iterator[BondFace]:
-    """Yield every face of the tools that forms a later bond face."""
-    *inner, last = moulds.plan.steps
-    for step in inner:
-        yield BondFace(Face(step.cup, "bore"), f"layer {step.index + 1}")
-    yield BondFace(Face(moulds.plan.base_of(inner[0]), "core"), "motor")
-    yield BondFace(Face(moulds.plan.base_of(inner[0]), "seat"), "the next layer")
-    yield BondFace(Face(moulds.plan.base_of(last), "core and moat"), f"layer {last.index - 1}")
-
-
 def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
-    array: Array = moulds.arranged
+    array: Array = moulds.array
     yield moulds.across
     yield (
         f"The sheet between the units: {grams_shown(array.sheet.thickness_mm, 2)} mm thick, at its four edges and in "
@@ -289,7 +241,7 @@ def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str
 
 def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
     """Yield the bill of the whole set, with bent and straight filaments as separate items."""
-    places = len(moulds.arranged.places)
+    places = len(moulds.array.places)
     for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
         if item.item == "filament":
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
@@ -299,6 +251,7 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
             yield item
 
 
+WIRE = "thin and insulated, two for each tail that ends under the sheet"
 ONCE = frozenset((name, unit) for name, (unit, _, _) in REQUIRED_TOOLS.items())
 """Things, by name and unit, of which one piece, dab or roll is enough for every casting: a roll of tape, no strips."""
 
@@ -307,16 +260,18 @@ def pocket_bill(
     moulds: PatchMoulds, batch: Batch, steps: Sequence[BenchStep], units: Mapping[str, Procedure]
 ) -> tuple[Item, ...]:
     """Return the bill of units and sheet. `batch` and `steps`: of the sheet; `units` by their folder."""
-    silicone, mix = batch.silicone, batch.mix
+    silicone, mix, covered = batch.silicone, batch.mix, covered_tails(moulds.array)
     net = f"sheet: {number(mix.net_g, 3)} g net"
+    # A motor has two poles.
+    wires = [Item("lead wire", 2 * len(covered), "piece", "bought", WIRE)] if covered else []
     own = [
         *(replace(item, note=f"for the sheet: {item.note}") for item in list_pieces(moulds)),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", net),
-        *_wires(moulds.arranged),
+        *wires,
         *list_consumables(moulds, [batch], steps),
     ]
-    return tuple(_added([*_scaled(moulds.arranged, units), *own]))
+    return tuple(_added([*_scaled(moulds.array, units), *own]))
 
 
 def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str, Procedure, int, int]]:
@@ -326,13 +281,6 @@ def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str,
         (spec, folder, unit, held[i], math.ceil(held[i] / unit.cells))
         for i, (spec, (folder, unit)) in enumerate(zip(array.units, units.items(), strict=True))
     ]
-
-
-def _wires(array: Array) -> Iterator[Item]:
-    """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
-    if covered := covered_tails(array):
-        note = "thin and insulated, two for each tail that ends under the sheet"
-        yield Item("lead wire", 2 * len(covered), "piece", "bought", note)
 
 
 def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
@@ -387,10 +335,9 @@ def pocket_procedure(
 ) -> Procedure:
     """Return the procedure of an array whose units are cast apart.
 
-    `sheet_mm3`: volume of the sheet. `printed_mm3`: of tray and blade. `units`: the procedure of each distinct unit
-    by its folder, in the order of `Array.units`.
+    `units`: the procedure of each distinct unit by its folder, in the order of `Array.units`.
     """
-    array, spec, (step,) = moulds.arranged, moulds.spec, moulds.plan.steps
+    array, spec, (step,) = moulds.array, moulds.spec, moulds.plan.steps
     silicone = catalogue.materials(spec.materials)[step.material]
     batch = Batch(moulds, step, silicone, sheet_mm3, 1)
     cast = tuple(_units(array, units))
@@ -435,7 +382,6 @@ def pocket_procedure(
         label=moulds.plan.label,
         cells=1,
         vacuum=spec.casting.vacuum,
-        tunnels=(),
         earliest_finish_min=finish,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
@@ -443,11 +389,9 @@ def pocket_procedure(
         preparation=(*cast, *prepared),
         unit_heights=(),
         pours=(pour,),
-        bonds=(),
         release=out,
         assembly=together,
         measure=tuple(_measure(array, grams, units)),
-        eccentricity=None,
         troubles=troubles(moulds),
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",
@@ -501,12 +445,11 @@ def _sort(moulds: PatchMoulds) -> str:
 
 
 def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedure]) -> Printing:
-    """Return the plates of the sheet and of each distinct unit."""
     sheet, of_units = printing(moulds, solid_mm3), [unit.printing for unit in units.values()]
     files = [f"{folder}/{plate}" for folder, unit in units.items() for plate in unit.printing.plates]
     return replace(
         sheet,
-        sizes=tuple(_sizes(moulds.arranged, of_units)),
+        sizes=tuple(_sizes(moulds.array, of_units)),
         plates=(*sheet.plates, *files),
         minutes=sheet.minutes + sum(each.minutes for each in of_units),
         cm3=sheet.cm3 + sum(each.cm3 for each in of_units),
@@ -524,7 +467,7 @@ def _sizes(array: Array, of_units: Sequence[Printing]) -> Iterator[Size]:
 
 
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
-    thick = number(moulds.arranged.sheet.thickness_mm, 3)
+    thick = number(moulds.array.sheet.thickness_mm, 3)
     yield BenchStep(
         "Peel off",
         "Cut the sheet free from the groove's silicone along the land. Loosen a corner with a blunt spatula and peel "
@@ -596,4 +539,11 @@ def array_procedure(
         return pocket_procedure(moulds, layer_volumes_mm3[0], printed_mm3, of_units)
     if way.cast == "curved":
         return curved_procedure(moulds, layer_volumes_mm3, printed_mm3)
-    return back_sheet_procedure(moulds, layer_volumes_mm3, printed_mm3)
+    made = procedure(moulds, layer_volumes_mm3, printed_mm3)
+    *line, last = made.time_line
+    return replace(
+        made,
+        assembly=motors_in(made.assembly),
+        time_line=(*line, replace(last, name="motors and circuit in")),
+        last="Motors and circuit in",
+    )

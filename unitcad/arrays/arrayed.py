@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from unitcad import __version__
 from unitcad.arrays.array import Array
@@ -45,7 +45,6 @@ from unitcad.casting.procedure_text import files as written
 from unitcad.casting.steps import pour_warnings
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
-from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finish, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
@@ -101,24 +100,9 @@ class Arrayed(Compound):
     def read(cls, path: Path) -> dict[str, Any]:
         return expand(read_toml(path), path.parent)
 
-    @classmethod
-    def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        return suggest_for_array(refusal, data)
-
-    @classmethod
-    def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:
-        return write_array_page(folder, warn)
-
-    @classmethod
-    def estimate(
-        cls,
-        names: Sequence[str],
-        sets: Sequence[str],
-        hertz: float | None,
-        details: bool,
-        as_json: bool,
-    ) -> None:
-        estimate_arrays(names, sets, hertz, details, as_json)
+    offered = staticmethod(suggest_for_array)
+    write_page = staticmethod(write_array_page)
+    estimate = staticmethod(estimate_arrays)
 
     def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
         return array_summary(self.of, folder, manifest, given)
@@ -139,9 +123,6 @@ class Arrayed(Compound):
 
     def with_formats(self, formats: Sequence[Format]) -> Arrayed:
         return Arrayed(with_formats(self.of, tuple(formats)))
-
-    def same_file(self, data: dict[str, Any]) -> Arrayed:
-        return Arrayed(array_of(data))
 
     def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
         array: Array = self.of
@@ -203,7 +184,9 @@ class Arrayed(Compound):
             ]
             found = of_unit["check"]["findings"]
             meshes += [MeshFinding(**{**one, "path": f"{folder}/{one['path']}"}) for one in found]
-            parts += [_under(folder, part) for part in of_unit["parts"]]
+            for part in of_unit["parts"]:
+                under = {form: BodyFile(**{**f, "path": f"{folder}/{f['path']}"}) for form, f in part["files"].items()}
+                parts.append({**part, "name": f"{folder}: {part['name']}", "files": under})
             warned += [f"{folder}: {line}" for line in of_unit["warnings"]]
         manifest = ArrayManifest(
             name=array.name,
@@ -257,13 +240,13 @@ def _unit(
 
 def _given(moulds: PatchMoulds, unit: Spec) -> frozenset[str]:
     """Return the paths of given values in a unit's own spec."""
-    paths = moulds.arranged.paths_of(unit)
+    paths = moulds.array.paths_of(unit)
     return frozenset(key.removeprefix(path) for key in moulds.given for path in paths if key.startswith(path))
 
 
 def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[str, str]]:
     """Return records and files of the silicone that the units share, and the files of the whole patch."""
-    blank, bodies, formats = moulds.blank, patch_bodies(moulds.arranged), moulds.spec.output.formats
+    blank, bodies, formats = moulds.blank, patch_bodies(moulds.array), moulds.spec.output.formats
     # A helper makes it in the meantime.
     step = [begun(step_file("patch/patch.step", blank, bodies, "patch"))] if "step" in formats else []
     parts: list[PartRecord] = []
@@ -279,7 +262,7 @@ def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[st
             part["files"]["stl"] = BodyFile(path=path, sha256=files[path])
         parts.append(part)
     if "glb" in formats:
-        draw = partial(patch_glb, blank, patch_parts(moulds.arranged))
+        draw = partial(patch_glb, blank, patch_parts(moulds.array))
         files["patch/patch.glb"] = store.file(joint_key(blank, bodies, "patch.glb"), draw)
     return parts, files | {planned.path: store.file(planned.key(), planned.make) for planned in step}
 
@@ -287,9 +270,8 @@ def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[st
 def _procedure(
     moulds: PatchMoulds, volumes: Sequence[float], printed: float, units: Mapping[str, Product]
 ) -> Procedure:
-    """Return how the array is cast."""
     of_units = {}
-    for folder, unit in unit_folders(moulds.arranged).items() if moulds.construction.own_tails else ():
+    for folder, unit in unit_folders(moulds.array).items() if moulds.construction.own_tails else ():
         manifest, own = units[folder].manifest, MouldSet(unit, given=_given(moulds, unit))
         of_each = [step["layer_volume_mm3"] for step in manifest["steps"]]
         of_units[folder] = unit_procedure(own, of_each, printed_mm3(manifest["parts"]))
@@ -327,14 +309,6 @@ def _record(array: Array, folders: list[str]) -> dict[str, Any]:
         ],
         "covered_tails": list(covered_tails(array)),
     }
-
-
-def _under(folder: str, part: PartRecord) -> PartRecord:
-    """Return a unit's part as the array's manifest has it: name and files under the unit's folder."""
-    files = {
-        form: cast("BodyFile", {**file, "path": f"{folder}/{file['path']}"}) for form, file in part["files"].items()
-    }
-    return {**part, "name": f"{folder}: {part['name']}", "files": files}
 
 
 def _skipped(only: Sequence[str], check: bool, of_unit: list[Skipped]) -> Iterator[Skipped]:

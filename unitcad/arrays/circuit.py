@@ -20,12 +20,14 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, OpType
 from msgspec.structs import replace
 
-from unitcad.arrays.array import Array, Placed
+from unitcad.arrays.array import Array
 from unitcad.arrays.array_tables import CircuitTable
 from unitcad.arrays.constructions import construction_of
+from unitcad.arrays.layouts import Point as Place
 from unitcad.arrays.sheet import LENGTH, at_place
 from unitcad.arrays.tails import CLEAR, Strip
 from unitcad.designs import CIRCUIT_COLOUR, dimensions
+from unitcad.designs.dimensions import Pad
 from unitcad.designs.limits import up
 from unitcad.errors import Missing, Refusal, missing_extra
 from unitcad.export.chart import coord
@@ -44,24 +46,13 @@ Line = tuple[float, tuple[float, ...]]
 
 
 @dataclass(frozen=True)
-class CircuitPad:
-    """A round pad on the back of a place's motor."""
-
-    name: str
-    x: float
-    y: float
-    radius: float
-
-
-@dataclass(frozen=True)
 class Wiring:
-    """Pads, rows, and the spine from the first row to the end of the tail. `low` to `high`: its faces over the skin."""
+    """Places of the pads on the motors' backs, the pad, rows, and the spine from the first row to the tail's end."""
 
-    pads: tuple[CircuitPad, ...]
+    places: tuple[Place, ...]
+    pad: Pad
     rows: tuple[Strip, ...]
     spine: tuple[Strip, ...]
-    low: float
-    high: float
 
     @property
     def strips(self) -> tuple[Strip, ...]:
@@ -73,11 +64,6 @@ class Wiring:
         """The middle of the tail's end."""
         return self.spine[-1].end
 
-    @property
-    def thickness(self) -> float:
-        """The circuit's, mm."""
-        return self.high - self.low
-
 
 def wiring(array: Array) -> Wiring:
     """Return the common circuit of an array's motors.
@@ -86,15 +72,20 @@ def wiring(array: Array) -> Wiring:
     is free, or if the circuit would be bent too much round the limb.
     """
     table = array.circuit or CircuitTable()
-    pads, low, high = _pads(array, table)
-    _check_bend(array, pads, high - low, table)
+    pad = dimensions(array.unit).pad  # a back sheet's units are of one kind
+    assert pad is not None  # `back_sheet.level` refuses units without a circuit
+    if table.row_width_mm > 2 * pad.radius + _EPS:
+        limit = f"a row is no wider than the pads of {2 * pad.radius:g} mm"
+        raise Refusal("circuit.row_width_mm", table.row_width_mm, limit, 2 * pad.radius)
+    pads = [Place(place.name, place.x, place.y) for place in array.places]
+    _check_bend(array, pads, pad, table)
 
     def free(table: CircuitTable) -> tuple[Wiring | None, str]:
         blocked = ""
         for rows, spine, own in _ways(array, table, pads):
             blocked_now = _in_the_way(array, rows, spine, own)
             if not blocked_now:
-                return Wiring(tuple(pads), tuple(rows), tuple(spine), low, high), ""
+                return Wiring(tuple(pads), pad, tuple(rows), tuple(spine)), ""
             blocked = blocked or blocked_now
         return None, blocked
 
@@ -115,9 +106,7 @@ def wiring(array: Array) -> Wiring:
     raise Refusal("circuit.row_width_mm", table.row_width_mm, limit, narrower)
 
 
-def _ways(
-    array: Array, table: CircuitTable, pads: Sequence[CircuitPad]
-) -> Iterator[tuple[list[Strip], list[Strip], bool]]:
+def _ways(array: Array, table: CircuitTable, pads: Sequence[Place]) -> Iterator[tuple[list[Strip], list[Strip], bool]]:
     """Yield rows and spine of each possible circuit, and whether the spine passes through its units."""
     turned, half = table.rows == "y", table.row_width_mm / 2
     lines = _lines(pads, turned)
@@ -140,17 +129,7 @@ def _ways(
         yield rows, [_strip(p, q, half, turned) for p, q in pairwise(corners)], single and at[0] == lines[0][1][0]
 
 
-def _pads(array: Array, table: CircuitTable) -> tuple[list[CircuitPad], float, float]:
-    """Return the pads and the circuit's faces; a back sheet's units are of one kind. Raises Refusal for wide rows."""
-    pad = dimensions(array.unit).pad
-    assert pad is not None  # `back_sheet.level` refuses units without a circuit
-    if table.row_width_mm > 2 * pad.radius + _EPS:
-        limit = f"a row is no wider than the pads of {2 * pad.radius:g} mm"
-        raise Refusal("circuit.row_width_mm", table.row_width_mm, limit, 2 * pad.radius)
-    return [CircuitPad(place.name, place.x, place.y, pad.radius) for place in array.places], pad.low, pad.high
-
-
-def _lines(pads: Sequence[CircuitPad], turned: bool) -> list[Line]:
+def _lines(pads: Sequence[Place], turned: bool) -> list[Line]:
     """Return each row's place across and the places along it, sorted; the first row is the one farthest up."""
     lines: dict[float, list[float]] = {}
     for pad in pads:
@@ -159,7 +138,7 @@ def _lines(pads: Sequence[CircuitPad], turned: bool) -> list[Line]:
     return [(v, tuple(sorted(along))) for v, along in sorted(lines.items(), reverse=True)]
 
 
-def _gaps(pads: Sequence[CircuitPad], table: CircuitTable) -> list[float]:
+def _gaps(pads: Sequence[Place], table: CircuitTable) -> list[float]:
     """Return the possible places of a straight spine, the middle's nearest first: between columns, or through one."""
     columns = sorted({u for _, along in _lines(pads, table.rows == "y") for u in along})
     if len(columns) == 1:
@@ -189,9 +168,10 @@ def _in_the_way(array: Array, rows: Sequence[Strip], spine: Sequence[Strip], own
     A row passes through its units, so does an `own` spine.
     """
     for strip in (*rows, *spine):
-        through = own or strip in rows
+        through, (x0, y0), (x1, y1) = own or strip in rows, strip.start, strip.end
         for place in array.places:
-            if through and _on_line(strip, place):
+            off = abs((x1 - x0) * (place.y - y0) - (y1 - y0) * (place.x - x0))
+            if through and off < _EPS * math.hypot(x1 - x0, y1 - y0):
                 continue
             if to_segment((place.x, place.y), strip.start, strip.end) < place.radius + strip.half + CLEAR - _EPS:
                 return f"the unit {place.name}"
@@ -200,21 +180,15 @@ def _in_the_way(array: Array, rows: Sequence[Strip], spine: Sequence[Strip], own
     return ""
 
 
-def _on_line(strip: Strip, place: Placed) -> bool:
-    (x0, y0), (x1, y1) = strip.start, strip.end
-    return abs((x1 - x0) * (place.y - y0) - (y1 - y0) * (place.x - x0)) < _EPS * math.hypot(x1 - x0, y1 - y0)
-
-
-def _check_bend(array: Array, pads: Sequence[CircuitPad], thickness: float, table: CircuitTable) -> None:
+def _check_bend(array: Array, pads: Sequence[Place], pad: Pad, table: CircuitTable) -> None:
     """Raise Refusal for a limb so narrow that the circuit between two pads, which stay flat, is bent too much."""
     if array.radius_mm is None or table.rows == "y":
         return
-    least = LEAST_BEND * thickness
-    pad = pads[0].radius
+    least = LEAST_BEND * (pad.high - pad.low)
     for _, along in _lines(pads, turned=False):
         for one, other in pairwise(along):
             pitch = other - one
-            free = max(pitch - 2 * pad, 0.0)
+            free = max(pitch - 2 * pad.radius, 0.0)
             bend = array.radius_mm * free / pitch
             if bend < least * (1.0 - _EPS):
                 limit = (
@@ -292,7 +266,8 @@ def _outline(laid: Wiring, ring: tuple[float, float], clearance: float, corner: 
 
 def _rounded(laid: Wiring, ring: tuple[float, float], clearance: float, corner: float) -> tuple[CrossSection, str]:
     """Return the circuit as a polygon with inner corners of a radius, and the objection to it, or ""."""
-    discs = [CrossSection.circle(pad.radius, _segments(pad.radius)).translate((pad.x, pad.y)) for pad in laid.pads]
+    disc = CrossSection.circle(laid.pad.radius, _segments(laid.pad.radius))
+    discs = [disc.translate((pad.x, pad.y)) for pad in laid.places]
     joints = [CrossSection.circle(one.half, _segments(one.half)).translate(one.end) for one in laid.spine[:-1]]
     parts = [*discs, *joints, *(_rectangle(strip) for strip in laid.strips)]
     whole = CrossSection.batch_boolean(parts, OpType.Add)
@@ -307,7 +282,7 @@ def _rounded(laid: Wiring, ring: tuple[float, float], clearance: float, corner: 
     notches = CrossSection.batch_boolean([_rectangle(strip, clearance) for strip in laid.strips], OpType.Add)
     inner, r = ring
     silicone = CrossSection.circle(r, 128) - CrossSection.circle(inner, 128)
-    for pad in laid.pads:
+    for pad in laid.places:
         x, y = pad.x, pad.y
         near = np.flatnonzero((x0 < x + r) & (x1 > x - r) & (y0 < y + r) & (y1 > y - r))
         beside = (CrossSection.compose([pieces[i] for i in near]) ^ silicone.translate((x, y))) - notches
@@ -319,7 +294,7 @@ def _rounded(laid: Wiring, ring: tuple[float, float], clearance: float, corner: 
 def circuit_body(array: Array) -> Body:
     """Return the circuit at its place on the motors' backs."""
     laid = wiring(array)
-    drawn = Extrude(outline(array, laid), laid.low, laid.high)
+    drawn = Extrude(outline(array, laid), laid.pad.low, laid.pad.high)
     return Body("circuit", "unit", "circuit", drawn, CIRCUIT_COLOUR, made="bought")
 
 
@@ -419,10 +394,10 @@ def circuit_svg(laid: Wiring, outline: Profile) -> str:
         f'viewBox="{coord(x0 - _EDGE_MM)} {coord(-y1 - _EDGE_MM)} {wide} {high}">',
         f'<path id="outline" d="{outline_path(outline)}" fill="#f3cfa0" stroke="#8a4a0a" stroke-width="0.1"/>',
     ]
-    for pad in laid.pads:
+    for pad in laid.places:
         at = f'x="{coord(pad.x)}" y="{coord(0.5 - pad.y)}"'
         parts += [
-            f'<circle class="pad" cx="{coord(pad.x)}" cy="{coord(-pad.y)}" r="{coord(pad.radius)}" fill="none" '
+            f'<circle class="pad" cx="{coord(pad.x)}" cy="{coord(-pad.y)}" r="{coord(laid.pad.radius)}" fill="none" '
             'stroke="#8a4a0a" stroke-width="0.1" stroke-dasharray="0.6 0.4"/>',
             f'<text {at} font-family="sans-serif" font-size="1.5" text-anchor="middle">{escape(pad.name)}</text>',
         ]
@@ -465,9 +440,9 @@ def circuit_dxf(laid: Wiring, outline: Profile) -> bytes:
         space = document.modelspace()
         vertices = [(round(x, _DIGITS), round(y, _DIGITS), round(bulge, 12)) for x, y, bulge in outline.vertices]
         space.add_lwpolyline(vertices, format="xyb", close=True, dxfattribs={"layer": "OUTLINE"})
-        for pad in laid.pads:
+        for pad in laid.places:
             at = (round(pad.x, _DIGITS), round(pad.y, _DIGITS))
-            space.add_circle(at, round(pad.radius, _DIGITS), dxfattribs={"layer": "PADS"})
+            space.add_circle(at, round(laid.pad.radius, _DIGITS), dxfattribs={"layer": "PADS"})
             name = space.add_text(pad.name, height=_TEXT_MM, dxfattribs={"layer": "NAMES"})
             name.set_placement(at, align=ezdxf.enums.TextEntityAlignment.MIDDLE_CENTER)
         for kind in sorted(document.entitydb.dxf_types_in_use()):  # ezdxf adds their classes in the order of a set
@@ -498,11 +473,11 @@ def pad_table(array: Array, laid: Wiring) -> bytes:
     rows.writerow(("name", "what", "x_mm", "y_mm", "z_mm", "diameter_mm", "unit", "motor"))
 
     def add(name: str, what: str, at: Point, wide: float, *more: str) -> None:
-        rows.writerow((name, what, *(coord(value, 4) for value in (*at, laid.low, wide)), *more))
+        rows.writerow((name, what, *(coord(value, 4) for value in (*at, laid.pad.low, wide)), *more))
 
-    for pad, place in zip(laid.pads, array.places, strict=True):
+    for place in array.places:
         motor = motor_of(place.unit)
-        add(pad.name, "pad", (pad.x, pad.y), 2 * pad.radius, place.unit.name, motor.name if motor else "")
+        add(place.name, "pad", (place.x, place.y), 2 * laid.pad.radius, place.unit.name, motor.name if motor else "")
     add("tail", "end of the tail", laid.end, 2 * laid.spine[-1].half, "", "")
     return text.getvalue().encode()
 

@@ -18,14 +18,12 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.attenuation.curve import RANGE, contact, decay, ends
-from unitcad.attenuation.inputs import Drive
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.export.chart import coord
 from unitcad.shape import Profile
 from unitcad.text import join_words, number
 
-DRIVES: tuple[Drive, ...] = ("flat", "axial")
 _SUMS = ("sum", "root_sum_of_squares")
 _ENDS = {"low": "p10", "high": "p90"}
 DIGITS = 6
@@ -72,28 +70,18 @@ class Decays:
                 name = self.inputs[0].tissue_name
                 raise Refusal("estimate.tissue", one.tissue_name, f"units side by side are on one tissue, {name}", name)
         self.kind = np.array([array.units.index(place.unit) for place in array.places])
-        self.drives = [self.inputs[kind].drive for kind in self.kind]
         self.centre, self.edge = distances(array)
 
-    def decays(
-        self,
-        drivers: np.ndarray,
-        distances: np.ndarray,
-        drive: Drive | None = None,
-        end: dict[str, int] | None = None,
-    ) -> np.ndarray:
-        """Return |u| at distances (mm, (k, ...)) from the units of numbers `drivers`, (k,), over that at their edges.
-
-        `drive`: default: each unit's own.
-        """
+    def decays(self, drivers: np.ndarray, distances: np.ndarray, end: dict[str, int] | None = None) -> np.ndarray:
+        """Return |u| at distances (mm, (k, ...)) from the units numbered `drivers`, (k,), over that at their edges."""
         found = np.zeros(distances.shape)
         for kind, one in enumerate(self.inputs):
             rows = self.kind[drivers] == kind
             if np.any(rows):
-                found[rows] = decay(one, 1e-3 * distances[rows], drive, end=end)
+                found[rows] = decay(one, 1e-3 * distances[rows], end=end)
         return found
 
-    def both(self, drive: Drive) -> np.ndarray:
+    def both(self) -> np.ndarray:
         """Return the decays to the centre and to the nearest edge, shape (n, n, 2), rows the unit that drives.
 
         0 for itself.
@@ -101,7 +89,7 @@ class Decays:
         away = np.stack([self.centre, self.edge], axis=-1)
         found = np.zeros(away.shape)
         drivers, moved = np.nonzero(~np.eye(len(self.kind), dtype=bool))
-        found[drivers, moved] = self.decays(drivers, away[drivers, moved], drive)
+        found[drivers, moved] = self.decays(drivers, away[drivers, moved])
         return found
 
     def answer(
@@ -131,20 +119,16 @@ class Decays:
 def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> dict[str, Any]:
     """Return an array's crosstalk as JSON-ready data.
 
-    `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
-    edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `absolute`: a range.
+    `matrix`: the decay between each two units, rows the unit that drives, to the other's centre, null for itself, by
+    its own drive and frequency; `sums`: the sum at each place; `absolute`: a range in the motor's own amplitude.
 
     Raises Refusal for a unit without an estimate, and for a frequency out of range.
     """
     say("crosstalk: decay")
-    units, n = Decays(array), len(array.places)
-    matrices: dict[Drive, np.ndarray] = {drive: units.both(drive) for drive in DRIVES}
-    own = np.array([matrices[drive][i] for i, drive in enumerate(units.drives)])
-    sums = {
-        "own_drive": _sums(own[..., 0]),
-        **{drive: _sums(one[..., 0]) for drive, one in matrices.items()},
-    }
-    nearest, worst = _nearest(units, own), int(np.argmax(np.round(sums["own_drive"]["sum"], 9)))
+    units = Decays(array)
+    matrix = units.both()[..., 0]
+    sums = _sums(matrix)
+    nearest, worst = _nearest(units, matrix), int(np.argmax(np.round(sums["sum"], 9)))
     say("crosstalk: range")
     varied = {str(end): end for one in units.inputs for end in ends(one)}.values()
     answers = [units.answer(nearest, worst, end=end) for end in (None, *varied)]
@@ -152,22 +136,15 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
     names = [place.name for place in array.places]
     data: dict[str, Any] = {
         "array": array.name,
-        "units": n,
         "tissue": units.inputs[0].tissue_name,
-        "what": "|u| of the skin at a unit over |u| at the edge of the unit that drives, under its motor's force",
         "range": RANGE,
-        "distances": _along(array),
+        "distances": "along the skin, taken as flat"
+        if array.radius_mm is None
+        else f"along the skin, unrolled: round the limb of radius {array.radius_mm:g} mm a distance is the arc, the "
+        "shorter way round; the decay is that of flat skin",
         "places": [
-            {
-                "name": place.name,
-                "x_mm": place.x,
-                "y_mm": place.y,
-                "unit": place.unit.name,
-                "diameter_mm": place.unit.diameter_mm,
-                "drive": units.drives[i],
-                "frequency_hz": units.inputs[units.kind[i]].frequency.middle,
-            }
-            for i, place in enumerate(array.places)
+            {"name": name, "drive": own.drive, "frequency_hz": own.frequency.middle}
+            for name, own in zip(names, (units.inputs[kind] for kind in units.kind), strict=True)
         ],
         "nearest": nearest
         and {
@@ -178,14 +155,14 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
             "nearest_edge": ranged["nearest_edge"],
         },
         "worst": {"place": names[worst], **{key: ranged[key] for key in _SUMS}},
-        "sums": {name: {key: _rounded(one) for key, one in both.items()} for name, both in sums.items()},
-        "matrix": {
-            drive: {"centre": _table(one[..., 0]), "nearest_edge": _table(one[..., 1])}
-            for drive, one in matrices.items()
-        },
+        "sums": {key: np.round(one, DIGITS).tolist() for key, one in sums.items()},
+        "matrix": [
+            [None if i == j else value for j, value in enumerate(row)]
+            for i, row in enumerate(np.round(matrix, DIGITS).tolist())
+        ],
         "assumptions": ASSUMPTIONS,
+        "absolute": _absolute(units, matrix, worst, ranged),
     }
-    data["absolute"] = _absolute(units, own[..., 0], worst, ranged)
     return {**data, "answer": crosstalk_lines(data)}
 
 
@@ -200,32 +177,29 @@ def _quantity(every: np.ndarray) -> dict[str, float]:
     return {key: round(float(one), DIGITS) for key, one in ends.items()}
 
 
-def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
+def _nearest(units: Decays, matrix: np.ndarray) -> tuple[int, int] | None:
     """Return the numbers of the two units nearest to each other, of several the loudest; None for a single unit."""
     if len(units.kind) < 2:
         return None
     apart = np.where(np.eye(len(units.kind), dtype=bool), np.inf, np.round(units.centre, 6))
     nearest = np.argwhere(apart == apart.min()).tolist()
-    i, j = max(nearest, key=lambda pair: (round(float(own[pair[0], pair[1], 0]), 9), -pair[0], -pair[1]))
+    i, j = max(nearest, key=lambda pair: (round(float(matrix[pair[0], pair[1]]), 9), -pair[0], -pair[1]))
     return i, j
 
 
-def _absolute(units: Decays, own: np.ndarray, worst: int, ranged: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
-    """Return the amplitude at the worst place from the others, in motors' amplitudes, as a range.
+def _absolute(
+    units: Decays, matrix: np.ndarray, worst: int, ranged: Mapping[str, Mapping[str, float]]
+) -> dict[str, Any]:
+    """Return the amplitude at the worst place from the others, in motors' amplitudes, as a range; or why there is none.
 
     The 80 % ranges of the units' levels at the edge, all at one end, times the decay at the same end of its range.
     """
     answers = [estimate_spec(unit, (), layered=lambda variant: {})["answer"] for unit in units.array.units]
-    block: dict[str, Any] = {
-        "place": units.array.places[worst].name,
-        "unit": "of the motor's amplitude",
-        "range": "80 % ranges of the levels at the edge, times the range of the decay",
-    }
     if any(one["p10"] is None for one in answers):
-        return {**block, **dict.fromkeys(_SUMS), "reason": "the level of a unit is not known"}
+        return {"reason": "the level of a unit is not known"}
     levels = {end: np.array([one[point] for one in answers])[units.kind] for end, point in _ENDS.items()}
-    at_ends = {end: _sums(own * level[:, None]) for end, level in levels.items()}
-    return block | {
+    at_ends = {end: _sums(matrix * level[:, None]) for end, level in levels.items()}
+    return {
         name: {
             end: round(float(sums[name][worst]) * (ranged[name][end] / max(ranged[name]["value"], 1e-300)), DIGITS)
             for end, sums in at_ends.items()
@@ -234,39 +208,17 @@ def _absolute(units: Decays, own: np.ndarray, worst: int, ranged: Mapping[str, M
     }
 
 
-def _along(array: Array) -> str:
-    if array.radius_mm is None:
-        return "along the skin, taken as flat"
-    return (
-        f"along the skin, unrolled: round the limb of radius {array.radius_mm:g} mm a distance is the arc, the shorter "
-        "way round; the decay is that of flat skin"
-    )
-
-
-def _table(matrix: np.ndarray) -> list[list[float | None]]:
-    rounded = np.round(matrix, DIGITS).tolist()
-    for i, row in enumerate(rounded):
-        row[i] = None
-    return rounded
-
-
-def _rounded(values: np.ndarray) -> list[float]:
-    return [round(float(value), DIGITS) for value in values]
-
-
 def crosstalk_csv(array: Array) -> bytes:
     """Return a CSV file: `from` drives, `to` is moved; distances along the skin in mm, from the middle of `from`.
 
-    The other columns are |u| over that at the edge of `from`, to the `centre` and the nearest `edge` of `to`, by drive,
-    at `frequency_hz`. Raises Refusal as `crosstalk`.
+    The last columns are |u| over that at the edge of `from`, to the `centre` and the nearest `edge` of `to`. Raises
+    Refusal as `crosstalk`.
     """
     units = Decays(array)
     apart = ~np.eye(len(units.kind), dtype=bool)
     table = {"distance_mm": np.round(units.centre[apart], 4), "edge_mm": np.round(units.edge[apart], 4)}
     table["frequency_hz"] = np.array([one.frequency.middle for one in units.inputs])[units.kind[np.nonzero(apart)[0]]]
-    for drive in DRIVES:
-        both = np.round(units.both(drive)[apart], DIGITS)
-        table |= {f"{drive}_centre": both[:, 0], f"{drive}_edge": both[:, 1]}
+    table["centre"], table["edge"] = np.round(units.both()[apart], DIGITS).T
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("from", "to", *table))
@@ -292,20 +244,20 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
     if nearest is None:
         return ["A single unit has no neighbour: there is no crosstalk."]
     return [
-        f"{_percent(nearest['centre'])} of a unit's motion at its edge reaches the middle of its nearest neighbour "
-        f"({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
-        f"and {_percent(nearest['nearest_edge'])} the neighbour's edge.",
-        f"With all other units on, {_most(data)}: {_times(worst['root_sum_of_squares'])} times one "
+        f"{_ranged(nearest['centre'], 100, ' %')} of a unit's motion at its edge reaches the middle of its nearest "
+        f"neighbour ({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
+        f"and {_ranged(nearest['nearest_edge'], 100, ' %')} the neighbour's edge.",
+        f"With all other units on, {_most(data)}: {_ranged(worst['root_sum_of_squares'])} times one "
         f"unit's edge level if the motors are not synchronous (root of the sum of squares), and "
-        f"{_times(worst['sum'])} times if all are in phase.",
-        _absolute_line(data["absolute"]),
+        f"{_ranged(worst['sum'])} times if all are in phase.",
+        _absolute_line(worst["place"], data["absolute"]),
         IN_BRACKETS,
     ]
 
 
 def _most(data: Crosstalk) -> str:
     """Name the place that gets the most; equivalent places differ by the rounding of their centres."""
-    values = data["sums"]["own_drive"]["root_sum_of_squares"]
+    values = data["sums"]["root_sum_of_squares"]
     alike = max(values) - min(values) <= ALIKE * max(values)
     return "all get alike" if alike else f"{data['worst']['place']} gets the most"
 
@@ -316,30 +268,24 @@ def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
     In units' own levels at their edge. A ratio is None if one of the two is a single unit.
     """
     first, *others = every
-    own = _quantities(first)
     return [
         {
             "array": other["array"],
             "over": first["array"],
-            **{key: _over(there, own[key]) for key, there in _quantities(other).items()},
+            **{
+                key: round(there / own, 6) if there and own else None
+                for (key, there), own in zip(_compared(other).items(), _compared(first).values(), strict=True)
+            },
             "same_tissue": first["tissue"] == other["tissue"],
         }
         for other in others
     ]
 
 
-def _quantities(data: Crosstalk) -> dict[str, Any]:
-    """Return the quantities that are compared: the sums, and the nearest neighbour's, None for a single unit."""
-    nearest = data["nearest"] or dict.fromkeys(("centre", "nearest_edge"))
-    return {
-        "nearest_centre": nearest["centre"],
-        "nearest_edge": nearest["nearest_edge"],
-        **{key: data["worst"][key] for key in _SUMS},
-    }
-
-
-def _over(one: Mapping[str, float] | None, other: Mapping[str, float] | None) -> float | None:
-    return round(one["value"] / other["value"], 6) if one and other and other["value"] else None
+def _compared(data: Crosstalk) -> dict[str, float]:
+    """Return the values that are compared; 0 for a single unit."""
+    nearest = data["nearest"]["centre"]["value"] if data["nearest"] else 0.0
+    return {"nearest_centre": nearest, **{key: data["worst"][key]["value"] for key in _SUMS}}
 
 
 def ratio_line(one: Mapping[str, Any]) -> str:
@@ -358,23 +304,18 @@ def ratio_line(one: Mapping[str, Any]) -> str:
     )
 
 
-def _percent(quantity: Mapping[str, float]) -> str:
-    value, low, high = (number(100 * quantity[key], 2) for key in ("value", "low", "high"))
-    return f"{value} % ({low} to {high})"
+def _ranged(quantity: Mapping[str, float], factor: float = 1.0, unit: str = "") -> str:
+    value, low, high = (number(factor * quantity[key], 2) for key in ("value", "low", "high"))
+    return f"{value}{unit} ({low} to {high})"
 
 
-def _times(quantity: Mapping[str, float]) -> str:
-    value, low, high = (number(quantity[key], 2) for key in ("value", "low", "high"))
-    return f"{value} ({low} to {high})"
-
-
-def _absolute_line(block: Mapping[str, Any]) -> str:
-    root, phase = block["root_sum_of_squares"], block["sum"]
-    if root is None:
-        return f"No absolute level: {block['reason']}."
-    said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in (root, phase)]
+def _absolute_line(place: str, ranges: Mapping[str, Any]) -> str:
+    if "reason" in ranges:
+        return f"No absolute level: {ranges['reason']}."
+    each = (ranges["root_sum_of_squares"], ranges["sum"])
+    said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in each]
     return (
-        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase. "
+        f"At {place} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase. "
         "The ranges combine those of the edge level and of the decay."
     )
 
@@ -398,8 +339,7 @@ def heat_map_svg(data: Crosstalk) -> str:
     """
     places = data["places"]
     names = [place["name"] for place in places]
-    matrix = [data["matrix"][place["drive"]]["centre"][i] for i, place in enumerate(places)]
-    n = len(names)
+    matrix, n = data["matrix"], len(names)
     cell = min(56.0, max(2.0, _PAGE / n))
     left, top = (64.0, 74.0) if n <= _MOST_NAMES else (34.0, 60.0)
     high = _largest(value for row in matrix for value in row if value is not None)
@@ -439,7 +379,7 @@ def patch_map_svg(array: Array, data: Crosstalk, circuit: Profile | None = None)
     )  # fmt: skip
     scale = min(8.0, _PAGE / (x1 - x0), _PAGE / (y1 - y0))
     edge, top = 16.0, 44.0
-    values = data["sums"]["own_drive"]["root_sum_of_squares"]
+    values = data["sums"]["root_sum_of_squares"]
     high = _largest(values)
     head = [
         f"{array.name}: amplitude at each unit from all others",
@@ -506,12 +446,10 @@ def _colour(share: float) -> str:
 
 
 def _ink(share: float) -> str:
-    """Return the text's colour on the colour of a share."""
     return "#ffffff" if share > 0.55 else _INK
 
 
 def _scale(x: float, y: float, length: float, high: float) -> list[str]:
-    """Draw the scale of colours, in per cent."""
     part = length / STEPS
     bars = [
         f'<rect x="{coord(x)}" y="{coord(y + length - (i + 1) * part)}" width="14" height="{coord(part + 0.3)}" '

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ from rich.text import Text
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_command import assumed_line, checks_line, to_open
@@ -38,20 +36,11 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
-        yield from _more_cavities(array)
     yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from json.loads(crosstalk.read_bytes())["answer"][:2]
     yield from to_open(folder)
-
-
-def _more_cavities(array: Array) -> Iterator[str]:
-    """Say that units which are cast one by one may be cast together."""
-    held = Counter(array.units.index(place.unit) for place in array.places)
-    for i, count in held.items() if construction_of(array.construction, array.cast).own_tails else ():
-        if array.units[i].moulds.cavities == (1, 1) and count > 1:
-            yield f"{count} units one after the other in one cavity: [moulds] cavities = [2, 2] casts four at once"
 
 
 _MOST_PLACES, _MOST_PAIRS = 64, 16
@@ -92,33 +81,16 @@ def estimate_arrays(
 
 
 def _print_details(data: Mapping[str, Any]) -> None:
-    names = [place["name"] for place in data["places"]]
+    names, sums, matrix = [place["name"] for place in data["places"]], data["sums"], data["matrix"]
     if len(names) <= _MOST_PLACES:
-        print_table(_sums(data, names), f"sum of all other units there, times one unit's edge level: {_HOW}")
+        each = zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
+        rows = [{"unit": name, "root": number(root, 2), "sum": number(total, 2)} for name, root, total in each]
+        print_table(rows, f"sum of all other units there, times one unit's edge level: {_HOW}")
     if 1 < len(names) <= _MOST_PAIRS:
-        print_table(_matrix(data, names), "% of a unit's motion at its edge that reaches the middle of another")
+        shares = [["-" if value is None else number(100 * value, 2) for value in row] for row in matrix]
+        rows = [
+            dict(zip(("drives", *names), (name, *row), strict=True)) for name, row in zip(names, shares, strict=True)
+        ]
+        print_table(rows, "% of a unit's motion at its edge that reaches the middle of another")
     ranges = f"In brackets: {data['range']}."
     print_indented(ranges, *data["assumptions"], f"Distances are {data['distances']}.")
-
-
-def _sums(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
-    """Tabulate the amplitude at each unit from all others."""
-    mixed = len({place["drive"] for place in data["places"]}) > 1
-    labels = {"own_drive": "own"} if mixed else {}
-    labels |= {"flat": "flat", "axial": "axial"}
-    sums = {
-        f"{label}\n{head}": data["sums"][key][kind]
-        for key, label in labels.items()
-        for head, kind in (("root", "root_sum_of_squares"), ("sum", "sum"))
-    }
-    return [{"unit": name, **{head: number(at[i], 2) for head, at in sums.items()}} for i, name in enumerate(names)]
-
-
-def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, str]]:
-    """Tabulate the decay between each two units, by the own drive of the one that drives."""
-    rows = []
-    for i, place in enumerate(data["places"]):
-        decays = zip(names, data["matrix"][place["drive"]]["centre"][i], strict=True)
-        shares = {name: "-" if value is None else number(100 * value, 2) for name, value in decays}
-        rows.append({"drives": place["name"], **shares})
-    return rows

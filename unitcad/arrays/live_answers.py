@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from unitcad.arrays.array import Array, units_in
 from unitcad.arrays.array_file import array_of, expand, makeable_array, sound_array, to_toml
-from unitcad.arrays.array_page import patch_model, tools_model
+from unitcad.arrays.array_page import WORDS, patch_model, tools_model
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
 from unitcad.arrays.arrayed import unit_folders
@@ -176,8 +176,8 @@ def _crosstalk(array: Array, answer: Answer) -> None:
     data = crosstalk(array)
     answer.lines = data["answer"]
     answer.drawings = [
-        ("Vibration at each unit from all others, on the patch", patch_map_svg(array, data)),
-        ("Crosstalk from each unit (row) to each other one (column)", heat_map_svg(data)),
+        (WORDS["crosstalk-patch.svg"], patch_map_svg(array, data)),
+        (WORDS["crosstalk.svg"], heat_map_svg(data)),
     ]
 
 

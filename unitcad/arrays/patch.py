@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -26,8 +26,6 @@ from unitcad.shape.tree import Body
 from unitcad.spec import Spec, to_json, with_formats
 from unitcad.spec.resolved import CastLayer
 
-SHEET = "sheet"
-
 
 class PatchPart(NamedTuple):
     """A body in its own frame, its name among the parts, its places; without any it is in place."""
@@ -46,7 +44,7 @@ def patch_parts(array: Array) -> tuple[PatchPart, ...]:
     way = construction_of(array.construction, array.cast)
     shared = way.bodies(array)
     if way.own_tails:
-        shared = tuple(replace(body, name=SHEET, shape=_stretched(array, body.shape)) for body in shared)
+        shared = tuple(replace(body, name="sheet", shape=_stretched(array, body.shape)) for body in shared)
     own = []
     for i, unit in enumerate(array.units):
         places = tuple(place for place in array.places if array.units.index(place.unit) == i)
@@ -110,18 +108,12 @@ class PatchMoulds(MouldSet):
     for checks and procedure. Frame of the tools, mm.
     """
 
-    array: Array | None = None
-
-    @property
-    def arranged(self) -> Array:
-        """The array."""
-        assert self.array is not None
-        return self.array
+    array: Array = field(kw_only=True)
 
     @cached_property
     def construction(self) -> Construction:
         """The way that the array is made."""
-        return construction_of(self.arranged.construction, self.arranged.cast)
+        return construction_of(self.array.construction, self.array.cast)
 
     @cached_property
     def blank(self) -> PatchMoulds:
@@ -132,7 +124,7 @@ class PatchMoulds(MouldSet):
     @cached_property
     def geometry(self) -> str:
         """The inputs of the geometry, as a text: places, sheet and lengths, no silicone and no name."""
-        array = self.arranged
+        array = self.array
         distinct = [to_json(with_formats(geometric(unit))) for unit in array.units]
         places = [(p.name, p.x, p.y, p.angle_deg, array.units.index(p.unit)) for p in array.places]
         sheet = replace(array.sheet, material="")
@@ -142,27 +134,27 @@ class PatchMoulds(MouldSet):
     @cached_property
     def unit(self) -> tuple[Body, ...]:
         """The silicone as it is cast."""
-        return self.construction.bodies(self.arranged)
+        return self.construction.bodies(self.array)
 
     @property
     def parts(self) -> tuple[str, Spec]:
         """The array's own unit: those with several are cast apart."""
-        return "unit.", self.arranged.unit
+        return "unit.", self.array.unit
 
     @cached_property
     def laid_later(self) -> tuple[Body, ...]:
         """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
         if self.construction.own_tails:
             return ()
-        return tuple(body for body in patch_bodies(self.arranged) if body.kind in ("motor", "circuit"))
+        return tuple(body for body in patch_bodies(self.array) if body.kind in ("motor", "circuit"))
 
     @cached_property
     def pushed_in(self) -> tuple[Body, ...]:
         """The units in the pockets, at their places over the sheet as it is cast."""
         if not self.construction.own_tails:
             return ()
-        low = self.arranged.sheet.low
-        return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.arranged)[1:])
+        low = self.array.sheet.low
+        return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.array)[1:])
 
     @cached_property
     def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
@@ -170,7 +162,7 @@ class PatchMoulds(MouldSet):
         if not self.construction.own_tails:
             return super().together
         solids: dict[str, list[Shape]] = {}
-        for body in patch_bodies(self.arranged):
+        for body in patch_bodies(self.array):
             solids.setdefault(body.name.partition("-")[0], []).append(body.shape)
         return tuple((name, tuple(shapes)) for name, shapes in solids.items())
 
@@ -191,7 +183,7 @@ class PatchMoulds(MouldSet):
         return PatchMoulds(
             structs.replace(spec, layers=layers),
             replace(plan, tools=tools, steps=steps, dimensions=inner),
-            array=replace(self.arranged, cast="flat"),
+            array=replace(self.array, cast="flat"),
         )
 
     @property
@@ -202,24 +194,24 @@ class PatchMoulds(MouldSet):
     @property
     def across(self) -> str:
         """The lengths to measure."""
-        x0, y0, x1, y1 = self.arranged.sheet.outline
-        if self.arranged.cast == "curved":
-            along, radius = y1 - y0, self.arranged.radius_mm or 0.0
+        x0, y0, x1, y1 = self.array.sheet.outline
+        if self.array.cast == "curved":
+            along, radius = y1 - y0, self.array.radius_mm or 0.0
             return f"The sheet: {along:.2f} mm along the limb. Every unit sits on a tube of radius {radius:.2f} mm."
         middles = ""
-        if len(self.arranged.places) > 1:
-            middles = f" Between the middles of neighbouring units: {self.arranged.pitch_mm:.2f} mm."
+        if len(self.array.places) > 1:
+            middles = f" Between the middles of neighbouring units: {self.array.pitch_mm:.2f} mm."
         return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
 
     @property
     def poured_across(self) -> tuple[str, float]:
         """The widest open surface of a pour: the sheet's longer side, mm."""
-        x0, y0, x1, y1 = self.arranged.sheet.outline
+        x0, y0, x1, y1 = self.array.sheet.outline
         return "sheet", max(x1 - x0, y1 - y0)
 
     def greased(self, step: Step) -> str:
         """Return the faces that get petroleum jelly before a cup is put on, in the construction's words."""
-        return self.construction.greased(self.arranged, step.index)
+        return self.construction.greased(self.array, step.index)
 
     @property
     def source(self) -> str:
@@ -229,7 +221,7 @@ class PatchMoulds(MouldSet):
     @property
     def assembly(self) -> tuple[Fitting, ...]:
         """How motors and circuit go in, in the construction's words."""
-        return self.construction.assembly(self.arranged)
+        return self.construction.assembly(self.array)
 
     def pieces(self, name: str) -> int:
         """Return the number of solids that a body is drawn of: a layer of all units has one for each."""
@@ -241,9 +233,9 @@ class PatchMoulds(MouldSet):
         if self.altered:
             return self.altered
         try:
-            return plan_tools(self.arranged)
+            return plan_tools(self.array)
         except Refusal as refusal:
-            raise suggest_for_array(refusal, self.arranged.asked) from None
+            raise suggest_for_array(refusal, self.array.asked) from None
 
     @cached_property
     def dimensions(self) -> Dimensions:
@@ -253,7 +245,7 @@ class PatchMoulds(MouldSet):
     @cached_property
     def segments(self) -> int:
         """Sides of every full turn."""
-        return _segments(self.arranged)
+        return _segments(self.array)
 
     @cached_property
     def rib_spaces(self) -> Manifold:
@@ -262,12 +254,10 @@ class PatchMoulds(MouldSet):
 
 
 def patch_moulds(array: Array, altered: Plan | None = None, given: frozenset[str] = frozenset()) -> PatchMoulds:
-    """Return the mould set of an array's sheet; `altered` and `given`: see `MouldSet`."""
-    return PatchMoulds(patch_spec(array), altered, given, array=array)
+    """Return the mould set of an array's sheet; `altered` and `given`: see `MouldSet`.
 
-
-def patch_spec(array: Array) -> Spec:
-    """Return the spec of the sheet: the unit's lengths, silicones and lab, and the sheet as its layers."""
+    Its spec has the unit's lengths, silicones and lab, and the sheet as its layers.
+    """
     unit, way = array.unit, construction_of(array.construction, array.cast)
     layers = (CastLayer(material=array.sheet.material, wall_mm=array.sheet.margin_mm, cap_mm=array.sheet.thickness_mm),)
     if not way.own_tails:
@@ -275,4 +265,4 @@ def patch_spec(array: Array) -> Spec:
     entries = {name: entry for each in array.units for name, entry in each.materials.items()}
     moulds = structs.replace(unit.moulds, pour="open")  # units in pockets may be injected, their sheet is struck off
     own = {"name": array.name, "layers": layers, "materials": entries, "moulds": moulds}
-    return structs.replace(unit, fpcb=None, wires=None, **own)
+    return PatchMoulds(structs.replace(unit, fpcb=None, wires=None, **own), altered, given, array=array)

@@ -68,7 +68,7 @@ def too_much(
 
 
 STEP = 0.5
-"""Between two places that are tried for a text, mm."""
+"""Between two places that are tried for a text, a pin or a slot, mm."""
 Side = Literal["front", "back", "left", "right"]
 SIDES: dict[Side, tuple[int, int]] = {"front": (1, -1), "back": (1, 1), "left": (0, -1), "right": (0, 1)}
 """The axis that leads to each side of a tool, and its sign there."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from unitcad.designs.limits import down, up
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point as PlanePoint
 from unitcad.moulds.cuts import Feature
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.shape import Extrude, Profile, Shape, cut, cylinder, mm, moved, polygon, ring, rotated, turned
 from unitcad.spec import Spec
 
@@ -45,11 +46,8 @@ def rounded(box: Box, radius: float, grow: float = 0.0) -> Profile:
     )
     # A side without length, between two corners that meet, is none.
     after = (*corners[1:], corners[0])
-    return Profile(tuple(c for c, n in zip(corners, after, strict=True) if c[2] or _apart(c, n)))
-
-
-def _apart(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
-    return (mm(one[0]), mm(one[1])) != (mm(other[0]), mm(other[1]))
+    apart = ((mm(c[0]), mm(c[1])) != (mm(n[0]), mm(n[1])) for c, n in zip(corners, after, strict=True))
+    return Profile(tuple(corner for corner, far in zip(corners, apart, strict=True) if corner[2] or far))
 
 
 def slot_profile(box: Box) -> Profile:
@@ -61,6 +59,18 @@ def slot_profile(box: Box) -> Profile:
     if y1 - y0 >= x1 - x0:
         return Profile(((x0, y0 + r, 1.0), (x1, y0 + r, 0.0), (x1, y1 - r, 1.0), (x0, y1 - r, 0.0)))
     return Profile(((x0 + r, y0, 0.0), (x1 - r, y0, 1.0), (x1 - r, y1, 0.0), (x0 + r, y1, 1.0)))
+
+
+def draw_sheet(sheet: Sheet, low: float, high: float) -> Extrude:
+    """Draw a sheet from z to z, without its strap slots."""
+    return Extrude(rounded(sheet.outline, sheet.corner_mm), low, high, tuple(map(slot_profile, sheet.strap_slots)))
+
+
+def draw_groove(sheet: Sheet, spec: Spec, rim: float) -> Extrude:
+    """Draw the overflow groove round a sheet, in a tool whose rim is at that height, mm."""
+    land, width = spec.moulds.land_mm, spec.moulds.groove_width_mm
+    inner, outer = (rounded(sheet.outline, sheet.corner_mm, by) for by in (land, land + width))
+    return Extrude(outer, rim - groove_depth_of(spec, rim), rim + BEYOND, (inner,))
 
 
 BESIDE_SLOT = 2.0
@@ -220,15 +230,10 @@ def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float]:
     layout = asked.layout
     if layout["kind"] == "list":
         return "layout.points_mm", round(span, 3)
+    if layout["kind"] == "ring" and axis == 0:
+        return "limb.radius_mm", asked.limb.radius_mm or 0.0
     if layout["kind"] == "ring":
-        return (
-            ("layout.band_pitch_mm", layout["band_pitch_mm"])
-            if axis
-            else (
-                "limb.radius_mm",
-                asked.limb.radius_mm or 0.0,
-            )
-        )
+        return "layout.band_pitch_mm", layout["band_pitch_mm"]
     pitch = layout["pitch_mm"]
     return ("layout.pitch_mm", pitch) if isinstance(pitch, int | float) else (f"layout.pitch_mm.{axis}", pitch[axis])
 
@@ -279,8 +284,8 @@ def inside_of_end(array: Array, *, left: bool) -> Shape:
     """Draw all on the sheet's side of its left or right end: a plane through the axis, with round corners."""
     sheet = array.sheet
     x0, y0, x1, y1 = sheet.outline
-    r, far, quarter = sheet.corner_mm, 3 * array.back_radius_mm, math.tan(math.pi / 8)
-    corners = [(-far, y0, 0.0), (-r, y0, quarter), (0.0, y0 + r, 0.0), (0.0, y1 - r, quarter)]
+    r, far = sheet.corner_mm, 3 * array.back_radius_mm
+    corners = [(-far, y0, 0.0), (-r, y0, _QUARTER), (0.0, y0 + r, 0.0), (0.0, y1 - r, _QUARTER)]
     if mm(y0 + r) == mm(y1 - r):  # two corners that meet
         del corners[2]
     corners += [(-r, y1, 0.0), (-far, y1, 0.0)]
@@ -301,18 +306,16 @@ def strap_slot(array: Array, slot: Box, beyond: float) -> Shape:
     )
 
 
-@dataclass(frozen=True)
-class Bending:
+class Bending(NamedTuple):
     """An array bent round its limb; lengths in mm, strains as shares (1 is 100 %).
 
     middle_radius  of the sheet's middle, which keeps its length; the ring round the limb is closed at 2 pi times it
     ends           from one end of the sheet to the other, round the limb, along its middle
     strain         of the sheet's two faces if it bends equally everywhere
-    strain_between the same if the units stay flat and only the sheet between them bends; None if units touch all the
-    way sagitta        from the limb's skin to a unit's, at the edge of a unit that stays flat and touches in its middle
+    strain_between the same if only the sheet between flat units bends; None if units touch all the way
+    sagitta        from the limb's skin to a unit's, at the edge of a unit that stays flat and touches in its middle
     """
 
-    radius: float
     middle_radius: float
     closed: float
     ends: float
@@ -320,24 +323,18 @@ class Bending:
     strain_between: float | None
     sagitta: float
 
-    @property
-    def most(self) -> float:
-        """The larger of the two strains."""
-        return max(self.strain, self.strain_between or 0.0)
-
 
 def bending(array: Array) -> Bending | None:
     """Return how an array bends round its limb; None if it is worn flat."""
     radius, middle = array.radius_mm, array.middle_radius_mm
     if radius is None or middle is None:
         return None
-    sheet, widest = array.sheet, max(place.radius for place in array.places)
+    sheet, widest, closed = array.sheet, max(place.radius for place in array.places), 2 * math.pi * middle
     strain, free = sheet.thickness_mm / 2 / middle, _free(array)
     return Bending(
-        radius=radius,
         middle_radius=middle,
-        closed=2 * math.pi * middle,
-        ends=2 * math.pi * middle - (sheet.outline[2] - sheet.outline[0]),
+        closed=closed,
+        ends=closed - (sheet.outline[2] - sheet.outline[0]),
         strain=strain,
         strain_between=strain / free if free else None,
         sagitta=radius - math.sqrt(radius**2 - widest**2) if widest < radius else radius,
@@ -346,11 +343,11 @@ def bending(array: Array) -> Bending | None:
 
 def bent_stretches(array: Array) -> tuple[tuple[str, float], ...]:
     """Return the layers of a plan that stretch as the array is bent, or laid flat, and their strains in percent."""
-    bent = bending(array)
-    if not bent:
+    if not (bent := bending(array)):
         return ()
-    where = f"sheet bent round {bent.radius:g} mm" if array.cast == "flat" else "sheet laid flat for its circuit"
-    return ((where, 100 * bent.most),)
+    flat = array.cast == "flat"
+    where = f"sheet bent round {array.radius_mm:g} mm" if flat else "sheet laid flat for its circuit"
+    return ((where, 100 * max(bent.strain, bent.strain_between or 0.0)),)
 
 
 def bending_record(array: Array) -> dict[str, float | None] | None:

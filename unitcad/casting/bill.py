@@ -140,14 +140,6 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
         yield Item("wire", cells * wires.count, "piece", "bought", note)
 
 
-def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
-    """List the items for pours under a lid, each with its mix."""
-    size = max(batch.mix.syringe_size_ml for batch in batches)
-    tip = number(batches[0].moulds.spec.moulds.sprue_mm, 3)
-    yield Item("syringe", len(batches), "piece", "bought", f"{number(size, 3)} ml, tip up to {tip} mm")
-    yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
-
-
 def list_consumables(
     moulds: MouldSet, batches: Sequence[Batch], steps: Sequence[BenchStep], after: int = 0
 ) -> Iterator[Item]:
@@ -178,7 +170,10 @@ def list_consumables(
     if strips:
         yield Item("adhesive tape", strips, "strip", "bought", "8 mm wide, 30 mm long")
     if lidded:
-        yield from injecting(lidded)
+        size, tip = max(batch.mix.syringe_size_ml for batch in lidded), moulds.spec.moulds.sprue_mm
+        note = f"{number(size, 3)} ml, tip up to {number(tip, 3)} mm"
+        yield Item("syringe", len(lidded), "piece", "bought", note)
+        yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 
 def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:

@@ -287,15 +287,11 @@ Assumed: a line more or less; of a leaf, a tenth of its thickness.
 
 @dataclass(frozen=True)
 class Eccentricity:
-    """The largest distance of a bore from the core's axis, mm, if the gap is printed as drawn, and if it is not.
-
-    `off_mm` is the gap's error by the printer's play, per side.
-    """
+    """The largest distance of a bore from the core's axis, mm, if the gap is printed as drawn, and if it is not."""
 
     ribs: int
     as_drawn_mm: float
     at_worst_mm: float
-    off_mm: float
 
 
 def eccentricity(moulds: MouldSet) -> Eccentricity:
@@ -304,12 +300,12 @@ def eccentricity(moulds: MouldSet) -> Eccentricity:
     clearance, off, depth = lengths.plinth_clearance_mm, lengths.xy_play_mm, lengths.rib_interference_mm
     standing = ribs(moulds.spec, moulds.plan.layout)
     if not standing:
-        return Eccentricity(0, math.sqrt(2) * clearance, math.sqrt(2) * (clearance + off), off)
+        return Eccentricity(0, math.sqrt(2) * clearance, math.sqrt(2) * (clearance + off))
     # A gap can't be narrower than nothing; one wider than the ribs reach leaves the rest as play. Of opposite ribs one
     # is stronger by UNEVEN and the other weaker, along x and along y.
     tight = math.sqrt(2) * UNEVEN * (depth + min(off, clearance))
     loose = math.sqrt(2) * max(off - depth, 0.0)
-    return Eccentricity(len(standing), math.sqrt(2) * UNEVEN * depth, max(tight, loose), off)
+    return Eccentricity(len(standing), math.sqrt(2) * UNEVEN * depth, max(tight, loose))
 
 
 NEAR = 0.02

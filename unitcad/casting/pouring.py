@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 from unitcad.casting.drawings import grip_of, tape_places, tongue_prop
 from unitcad.casting.figures import (
@@ -29,7 +29,7 @@ from unitcad.casting.figures import (
     window_length,
 )
 from unitcad.casting.steps import BenchStep
-from unitcad.casting.views import is_fed_through, picture_path
+from unitcad.casting.views import is_fed_through, picture_path, pour_picture
 from unitcad.catalogue import Material
 from unitcad.designs.design import ADHESIVE, Fitting, bond
 from unitcad.moulds.cup import ribs
@@ -45,61 +45,15 @@ LEVEL_AGAIN = "Correct the level with paper."
 """How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
 
 
-@dataclass(frozen=True)
-class Face:
-    """A face of a tool that silicone takes its shape from, such as the bore of "cup1"."""
-
-    tool: str
-    face: str
-
-
-@dataclass(frozen=True)
-class BondFace:
-    """A face of a tool whose cast bonds later, to `to`. Silicone does not bond where agent was."""
-
-    face: Face
-    to: str
-
-
-def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
-    """Return every face of the tools that forms a bonding face, or that is next to one in a later pour."""
-    plan, last = moulds.plan, moulds.plan.steps[-1]
-    found = []
-    for step in plan.steps:
-        if step is not last:
-            found.append((step.cup, "bore", f"layer {step.index + 1}"))
-        if step.lid and not (step is last and moulds.spec.motor.absent):
-            found.append((step.lid, "underside", "circuit" if step is last else f"layer {step.index + 1}"))
-    if not plan.concentric and not plan.pins and len(plan.steps) > 1:
-        # Its bore may meet a layer that is cured already, to which the last one has to bond; a back sheet's, whose cups
-        # are on pins, meets none.
-        found.append((last.cup, "bore", f"layer {last.index - 1}"))
-    if not moulds.spec.motor.absent:
-        found.append(("base", "core", "motor"))
-    if len(plan.steps) > 1:
-        found.append(("base", "seat", "the next layer"))
-    return tuple(BondFace(Face(tool, face), to) for tool, face, to in found)
-
-
-def agent_faces(moulds: MouldSet, step: Step) -> tuple[Face, ...]:
-    """Return the faces that may get release agent before a pour: the last cup's bore, if nothing bonds to it later."""
-    bore = Face(step.cup, "bore")
-    bonds = any(bond.face == bore for bond in bond_faces(moulds))
-    return () if bonds or step is not moulds.plan.steps[-1] else (bore,)
-
-
-def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
-    """Describe one pour, from an empty mould to a cured layer on the core; `views`: the names of the pictures."""
+def pour_steps(batch: Batch) -> Iterator[BenchStep]:
+    """Describe one pour, from an empty mould to a cured layer on the core."""
     moulds, step, n = batch.moulds, batch.step, batch.step.index
     plan, spec, tongues = moulds.plan, moulds.spec, moulds.plan.standing(step, "tongue")
     cells, the_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
     # Each cavity has a groove, which stops next to a window.
     groove = "the groove" if len(step.layer) == 1 else "the grooves"
 
-    def picture(name: str) -> str:
-        path = f"pour{n}-{name}"
-        return picture_path(path) if path in views else ""
-
+    picture = partial(pour_picture, n)
     if n > 1:
         bond = "Its outside" if plan.concentric else f"The face that Layer {n} touches"
         yield BenchStep(
@@ -136,17 +90,17 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             minutes=1.0 * cells,
             required_tools=("petroleum jelly",),
         )
-    # The faces that get release agent, and why no other does.
-    faces, agent = agent_faces(moulds, step), "No release agent: what is cast here bonds later."
-    if faces and plan.pins:
+    # Nothing bonds to the last cup's bore. One by complement may meet a cured layer, to which its own has to bond.
+    bare = step is plan.steps[-1] and (plan.concentric or bool(plan.pins) or n == 1)
+    agent = "No release agent: what is cast here bonds later."
+    if bare and plan.pins:
         earlier = f" and Layer {n - 1}" if n > 1 else ""
         agent = (
             f"Release agent, if any, thinly and only on the sheet's bed and the bores of cup {n}, away from the base: "
             f"a printed cup holds a thin sheet fast. None in the fins' slots, on the base{earlier}."
         )
-    elif faces:
-        where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
-        agent = f"Release agent, if any, thinly and only on {where}, away from the {holds(moulds)}."
+    elif bare:
+        agent = f"Release agent, if any, thinly and only on the bore of cup {n}, away from the {holds(moulds)}."
     # Ribs centre the cup, or a push as for the cup before.
     if ribs(spec, plan.layout):
         on = "on and press it down evenly until it sits; its ribs centre it."
@@ -164,7 +118,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         f"{agent} Put cup {n} {on}",
         picture("cup-on"),
         minutes=2.0,
-        required_tools=("release agent",) if faces else (),
+        required_tools=("release agent",) if bare else (),
     )
     if tongues:
         seat = number(window_length(moulds, step), 2)
@@ -258,19 +212,15 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "Lay a screwdriver in each pry slot, its tip under the cup. Press both handles down together, little by "
             "little."
         )
+    back = "from the skin's side" if step is plan.steps[-1] else "and put it back"
     yield BenchStep(
         f"Cup {n} off",
-        f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. {recovery(moulds, n)}",
+        f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. Layer {n} should stay on "
+        f"the {holds(moulds)}: if it comes off in the cup, push it out {back}.",
         picture("cup-off"),
         minutes=LIFT_MIN,
         required_tools=("blunt spatula",) if split else (),
     )
-
-
-def recovery(moulds: MouldSet, layer: int) -> str:
-    """Say where a layer stays when its cup is lifted, and what to do if it does not."""
-    back = "from the skin's side" if layer == len(moulds.plan.steps) else "and put it back"
-    return f"Layer {layer} should stay on the {holds(moulds)}: if it comes off in the cup, push it out {back}."
 
 
 def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
@@ -415,22 +365,17 @@ def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
     )
 
 
-def never_pushed(spec: Spec, inner: Material) -> str:
-    """Describe the effect of pulling a filament, and of pushing it: `inner` is Layer 1's silicone."""
-    tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
-    return f"it lets air in under the unit. Never push it through: {number(tear, 2)} N tear {inner.name} (computed)."
-
-
 def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
     """Describe the way from the last cured layer to a unit in the hand; `first` is Layer 1's silicone."""
     plan, cells, last = moulds.plan, len(moulds.plan.layout.cells), moulds.plan.steps[-1]
     cup, removed = spaced(last.cup), {removal.piece for removal in last.removals}
     if plan.of_kind("filament"):
         each = "the" if cells == 1 else "each"
+        tear = float(first.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
         yield BenchStep(
             "Filament out",
-            f"Lift the mould off the bench. Pull {each} filament out downwards, by its bent end: "
-            f"{never_pushed(moulds.spec, first)}",
+            f"Lift the mould off the bench. Pull {each} filament out downwards, by its bent end: it lets air in under "
+            f"the unit. Never push it through: {number(tear, 2)} N tear {first.name} (computed).",
             picture_path("filament-out"),
             minutes=PULL_MIN * cells,
         )

@@ -271,8 +271,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         required_tools=("isopropanol and lint-free wipes",),
     )
     exit = moulds.plan.dimensions.exit
-    if exit and tunnels(moulds):
-        steps = [step for step in moulds.plan.steps if step.windows]
+    if exit and (steps := [step for step in moulds.plan.steps if step.windows]):
         windows = [window_section(moulds.spec, exit, step.rim) for step in steps]
         height = number(min(high - low for _, low, high in windows), 2)
         yield BenchStep(
@@ -321,11 +320,6 @@ def fall(moulds: MouldSet) -> tuple[str, str]:
 def in_resin(moulds: MouldSet) -> bool:
     """Tell whether the tools are printed in resin."""
     return printer_of(moulds.spec).technology.value == "sla"
-
-
-def tunnels(moulds: MouldSet) -> tuple[str, ...]:
-    """Return the cups through whose wall a window runs that resin may cure shut."""
-    return tuple(step.cup for step in moulds.plan.steps if step.windows) if in_resin(moulds) else ()
 
 
 def joining(moulds: MouldSet) -> Iterator[BenchStep]:

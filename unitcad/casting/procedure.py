@@ -8,21 +8,9 @@ from typing import Any
 
 from unitcad import catalogue
 from unitcad.casting.bill import Item, bill
-from unitcad.casting.figures import (
-    DEGASSING_MIN,
-    Batch,
-    Eccentricity,
-    Figure,
-    UnitHeight,
-    eccentricity,
-    unit_heights,
-)
+from unitcad.casting.figures import Batch, Figure, UnitHeight, unit_heights
 from unitcad.casting.pouring import (
-    BondFace,
-    Face,
     after_pours,
-    agent_faces,
-    bond_faces,
     film_mm3,
     measurements,
     motor_in,
@@ -30,10 +18,9 @@ from unitcad.casting.pouring import (
     release,
     skin_on,
 )
-from unitcad.casting.preparation import Printing, preparation, printing, tunnels
+from unitcad.casting.preparation import Printing, preparation, printing
 from unitcad.casting.steps import BenchStep, Phase, phases
 from unitcad.casting.troubles import Trouble, troubles
-from unitcad.casting.views import views
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import warnings
 
@@ -42,7 +29,6 @@ from unitcad.validation import warnings
 class Pour:
     """One pour: its figures, the verdict on bubbles, the steps, and the drawing of it assembled.
 
-    `agent`: the faces that may get release agent before it. `degassing_min`: in the vacuum; 0 without one.
     Times are those of the room. `drawing` is the section, each step's picture is in 3D.
     """
 
@@ -53,8 +39,6 @@ class Pour:
     verdict: str
     bubbles_stay: bool
     over_pot_life_min: float
-    agent: tuple[Face, ...]
-    degassing_min: float
     part_a_g: float
     part_b_g: float
     pot_life_min: float
@@ -72,16 +56,12 @@ class Procedure:
 
     `makes`: the product; `last`: the purpose of `assembly`, for which silicone is mixed `later_mixes` times.
     `castings`: how often moulds of units are filled, if units are cast apart from the sheet.
-    `bonds` are the tools' faces that must never get release agent.
-    `tunnels`: the cups whose windows resin may cure shut.
-    `eccentricity` is that of the cups on the core; None without cups.
     """
 
     name: str
     label: str
     cells: int
     vacuum: bool
-    tunnels: tuple[str, ...]
     earliest_finish_min: float
     bench_min: float
     time_line: tuple[Phase, ...]
@@ -89,11 +69,9 @@ class Procedure:
     preparation: tuple[BenchStep, ...]
     unit_heights: tuple[UnitHeight, ...]
     pours: tuple[Pour, ...]
-    bonds: tuple[BondFace, ...]
     release: tuple[BenchStep, ...]
     assembly: tuple[BenchStep, ...]
     measure: tuple[str, ...]
-    eccentricity: Eccentricity | None
     bill: tuple[Item, ...]
     warnings: tuple[str, ...] = ()
     troubles: tuple[Trouble, ...] = ()
@@ -103,8 +81,8 @@ class Procedure:
     castings: int = 0
 
 
-def pour_of(batch: Batch, steps: Iterable[BenchStep], agent: Sequence[Face] = ()) -> Pour:
-    """Return the record of a pour; `agent` as in `Pour`."""
+def pour_of(batch: Batch, steps: Iterable[BenchStep]) -> Pour:
+    """Return the record of a pour."""
     return Pour(
         index=batch.step.index,
         layer=batch.step.name,
@@ -113,8 +91,6 @@ def pour_of(batch: Batch, steps: Iterable[BenchStep], agent: Sequence[Face] = ()
         verdict=batch.verdict,
         bubbles_stay=batch.bubbles_stay,
         over_pot_life_min=batch.over_pot_life_min,
-        agent=tuple(agent),
-        degassing_min=DEGASSING_MIN if batch.vacuum else 0.0,
         part_a_g=batch.mix.part_a_g,
         part_b_g=batch.mix.part_b_g,
         pot_life_min=batch.pot_min,
@@ -129,13 +105,13 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
 
     `layer_volumes_mm3`: of each layer of one unit, from the inside out. `printed_mm3`: of all printed pieces.
     """
-    spec, plan, shown = moulds.spec, moulds.plan, views(moulds)
+    spec, plan = moulds.spec, moulds.plan
     known, cells = catalogue.materials(spec.materials), len(plan.layout.cells)
     batches = [
         Batch(moulds, step, known[step.material], volume, cells)
         for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True)
     ]
-    pours = tuple(pour_of(batch, pour_steps(batch, shown), agent_faces(moulds, batch.step)) for batch in batches)
+    pours = tuple(pour_of(batch, pour_steps(batch)) for batch in batches)
     silicones = [batch.silicone for batch in batches]
     grams = [batch.volume_mm3 * float(batch.silicone.density_g_cm3) / 1000 for batch in batches]
     skin_g = film_mm3(moulds) * float(silicones[-1].density_g_cm3) / 1000
@@ -151,17 +127,14 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         label=plan.label,
         cells=cells,
         vacuum=spec.casting.vacuum,
-        tunnels=tunnels(moulds),
         **times(prepared, pours, out, last, motor),
         printing=printing(moulds, printed_mm3),
         preparation=prepared,
         unit_heights=tuple(unit_heights(moulds)),
         pours=pours,
-        bonds=bond_faces(moulds),
         release=out,
         assembly=motor,
         measure=tuple(measurements(moulds, grams, skin_g)),
-        eccentricity=eccentricity(moulds),
         warnings=tuple(warnings(spec, estimate=False)) if moulds.makes == "unit" else (),
         troubles=troubles(moulds),
         makes=moulds.makes,

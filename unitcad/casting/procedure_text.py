@@ -45,26 +45,19 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 
 def _shortened(procedure: Procedure) -> Procedure:
-    """Return the procedure with the short texts of its steps."""
-    left = iter(number_steps(_steps(procedure)))
+    before, after = procedure.preparation, (*procedure.release, *procedure.assembly)
+    left = iter(number_steps([*before, *(step for pour in procedure.pours for step in pour.steps), *after]))
 
     def next_of(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
         return tuple(islice(left, len(steps)))
 
     return replace(
         procedure,
-        preparation=next_of(procedure.preparation),
+        preparation=next_of(before),
         pours=tuple(replace(pour, steps=next_of(pour.steps)) for pour in procedure.pours),
         release=next_of(procedure.release),
         assembly=next_of(procedure.assembly),
     )
-
-
-def _steps(procedure: Procedure) -> Iterator[BenchStep]:
-    yield from procedure.preparation
-    for pour in procedure.pours:
-        yield from pour.steps
-    yield from (*procedure.release, *procedure.assembly)
 
 
 def to_json(procedure: Procedure) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from unitcad.moulds.mould_set import MouldSet
@@ -24,91 +24,74 @@ class Trouble:
     spec: str
 
 
-_KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
+_KNOWN: tuple[tuple[_Part | None, str, str, str, str], ...] = (
     (
-        Trouble(
-            "Silicone stays tacky",
-            "The parts were weighed or mixed wrong, or a surface inhibits the cure: latex, sulphur clay, fresh resin.",
-            "Touch the rest in the mixing cup. If it is soft, the mix was wrong: cast again. If it is firm, a surface "
-            "inhibits: wait a day, clean with isopropanol, coat the mould.",
-            "casting.minimum_mix_g larger, since a small batch can't be weighed well.",
-        ),
         None,
+        "Silicone stays tacky",
+        "The parts were weighed or mixed wrong, or a surface inhibits the cure: latex, sulphur clay, fresh resin.",
+        "Touch the rest in the mixing cup. If it is soft, the mix was wrong: cast again. If it is firm, a surface "
+        "inhibits: wait a day, clean with isopropanol, coat the mould.",
+        "casting.minimum_mix_g larger, since a small batch can't be weighed well.",
     ),
     (
-        Trouble(
-            "Silicone is torn",
-            "It was opened too early, lifted over a tongue, or levered only on one side.",
-            "Close a small tear with silicone adhesive. Cast again if it runs through the slot or into the bond.",
-            "the torn layer's wall_mm larger (Layer 1 is layers.0), or a silicone with more elongation at break.",
-        ),
         None,
+        "Silicone is torn",
+        "It was opened too early, lifted over a tongue, or levered only on one side.",
+        "Close a small tear with silicone adhesive. Cast again if it runs through the slot or into the bond.",
+        "the torn layer's wall_mm larger (Layer 1 is layers.0), or a silicone with more elongation at break.",
     ),
     (
-        Trouble(
-            "A layer sticks in its cup",
-            "Silicone grips the print's layer lines, and only the last cup may get release agent.",
-            "Push it out with a thumb. Put an inner layer back on the core and go on.",
-            "moulds.layer_mm smaller.",
-        ),
         "cup",
+        "A layer sticks in its cup",
+        "Silicone grips the print's layer lines, and only the last cup may get release agent.",
+        "Push it out with a thumb. Put an inner layer back on the core and go on.",
+        "moulds.layer_mm smaller.",
     ),
     (
-        Trouble(
-            "The unit sticks on the core",
-            "No air gets under it, or silicone grips the core's layer lines.",
-            "Check that the filament is out. Lift the edge with a blunt spatula all round and let in a drop of "
-            "isopropanol.",
-            "moulds.layer_mm smaller.",
-        ),
         "filament",
+        "The unit sticks on the core",
+        "No air gets under it, or silicone grips the core's layer lines.",
+        "Check that the filament is out. Lift the edge with a blunt spatula all round and let in a drop of "
+        "isopropanol.",
+        "moulds.layer_mm smaller.",
     ),
     (
-        Trouble(
-            "A bubble opens at the skin",
-            "Air stayed in the mix or in the corner of the seat.",
-            "Fill the hole with a drop of the same mix, strike it off and let it cure.",
-            f"{_VACUUM}a silicone that flows more easily.",
-        ),
         None,
+        "A bubble opens at the skin",
+        "Air stayed in the mix or in the corner of the seat.",
+        "Fill the hole with a drop of the same mix, strike it off and let it cure.",
+        f"{_VACUUM}a silicone that flows more easily.",
     ),
     (
-        Trouble(
-            "The circuit won't pass the slot",
-            "The tail's end is wider than the slot stretches, or a film closes the slot.",
-            "Cut the film. Wet the tail with isopropanol. Solder a wide end on after the tail is through.",
-            "moulds.slot_width_clearance_mm or moulds.slot_height_mm larger.",
-        ),
         "slot",
+        "The circuit won't pass the slot",
+        "The tail's end is wider than the slot stretches, or a film closes the slot.",
+        "Cut the film. Wet the tail with isopropanol. Solder a wide end on after the tail is through.",
+        "moulds.slot_width_clearance_mm or moulds.slot_height_mm larger.",
     ),
     (
-        Trouble(
-            "A cup rocks or sits high",
-            "The first layer bulges, a string is in between, or ribs are too tight.",
-            "Cut the bulge off, scrape both faces, press the cup on again.",
-            "moulds.rib_interference_mm smaller or moulds.plinth_clearance_mm larger: the fit coupon shows which.",
-        ),
         "cup",
+        "A cup rocks or sits high",
+        "The first layer bulges, a string is in between, or ribs are too tight.",
+        "Cut the bulge off, scrape both faces, press the cup on again.",
+        "moulds.rib_interference_mm smaller or moulds.plinth_clearance_mm larger: the fit coupon shows which.",
     ),
     (
-        Trouble(
-            "A film closes the slot",
-            "The tongue was not home, or grease did not close the gap round it.",
-            "Cut the film along the slot with a sharp knife before the motor goes in.",
-            "moulds.window_clearance_mm smaller: the fit coupon shows how far.",
-        ),
         "tongue",
+        "A film closes the slot",
+        "The tongue was not home, or grease did not close the gap round it.",
+        "Cut the film along the slot with a sharp knife before the motor goes in.",
+        "moulds.window_clearance_mm smaller: the fit coupon shows how far.",
     ),
     (
-        Trouble(
-            "The motor juts out of the skin",
-            "It is thicker than the spec says.",
-            "Nothing helps this unit: the cavity is too shallow.",
-            "motor.thickness_mm as the caliper shows it; then print again.",
-        ),
         "motor",
+        "The motor juts out of the skin",
+        "It is thicker than the spec says.",
+        "Nothing helps this unit: the cavity is too shallow.",
+        "motor.thickness_mm as the caliper shows it; then print again.",
     ),
 )
+"""Part of a mould set that has the fault, None for every set; then as `Trouble`."""
 
 
 def troubles(moulds: MouldSet | None = None) -> tuple[Trouble, ...]:
@@ -120,8 +103,8 @@ def troubles(moulds: MouldSet | None = None) -> tuple[Trouble, ...]:
         there |= {"slot"} if spec.fpcb and "tongue" in there else set()
     had = spec is not None and spec.casting.vacuum
     return tuple(
-        replace(trouble, spec=trouble.spec.removeprefix(_VACUUM)) if had else trouble
-        for trouble, part in _KNOWN
+        Trouble(sign, cause, now, change.removeprefix(_VACUUM) if had else change)
+        for part, sign, cause, now, change in _KNOWN
         if not moulds or part is None or part in there
     )
 

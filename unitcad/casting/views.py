@@ -135,6 +135,11 @@ def picture_path(name: str) -> str:
     return f"steps/{name}.png"
 
 
+def pour_picture(pour: int, name: str) -> str:
+    """Return the path of a pour's view (from 1)."""
+    return picture_path(f"pour{pour}-{name}")
+
+
 def level_on(moulds: MouldSet) -> Step:
     """Return the first pour whose rim takes a level: nothing on the base is higher."""
     steps, core = moulds.plan.steps, moulds.dimensions.core_height
@@ -461,12 +466,6 @@ _GAP = 9.0
 """Between pieces laid out side by side, mm."""
 _Key = tuple[Placed | Extra, bool]
 """The content of a view, and whether it is of the unit, not of its moulds."""
-
-
-def pictures(moulds: MouldSet) -> dict[str, bytes]:
-    """Return the PNG of every view of a set's procedure by its path in the result's folder."""
-    bench = BenchPictures(moulds)
-    return {picture_path(name): bench.picture(name) for name in bench.names}
 
 
 class BenchPictures:

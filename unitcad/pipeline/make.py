@@ -58,7 +58,6 @@ from unitcad.pipeline.scenes import drawing
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, printer_of, spec_hash, to_json, to_toml, with_formats
 from unitcad.spec.raw import Format
-from unitcad.validation import from_data
 
 MESH_FORMATS = ("stl", "3mf")
 """The formats whose files the mesh rules look at."""
@@ -144,10 +143,6 @@ class Subject:
     def with_formats(self, formats: Sequence[Format]) -> Subject:
         """Return the same subject with other formats."""
         return Subject(with_formats(self.of, tuple(formats)))
-
-    def same_file(self, data: dict[str, Any]) -> Subject:
-        """Return the subject of a result's own file."""
-        return Subject(from_data(data))
 
     def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
         """Make all files that `only` asks for, in memory and `store`.

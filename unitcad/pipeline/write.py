@@ -21,7 +21,7 @@ from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import check_outputs, code_version
-from unitcad.pipeline.subjects import subject
+from unitcad.pipeline.subjects import subject, subject_of_data
 from unitcad.spec import read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
 
@@ -135,7 +135,7 @@ def earlier_formats(folder: Path, wanted: Subject, *, ours: bool = False) -> tup
             return ()
         raise UnitcadError(f"{folder}: is not a result of unitcad (no {wanted.file}); choose another folder with -o")
     try:
-        there = wanted.same_file(read_toml(file, links=False))
+        there = subject_of_data(read_toml(file, links=False))
     except UnitcadError as error:
         if ours:
             return ()

@@ -12,6 +12,7 @@ from unitcad.arrays.circuit import Wiring, wiring
 from unitcad.arrays.constructions import Construction, Level
 from unitcad.arrays.piece_seams import (
     SIDES,
+    STEP,
     Side,
     Strip,
     along_side,
@@ -26,7 +27,7 @@ from unitcad.arrays.piece_seams import (
     sheet_mm2,
     too_much,
 )
-from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile, stopped_ring
+from unitcad.arrays.sheet import bent_stretches, draw_groove, draw_sheet, stopped_ring
 from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import ADHESIVE, BEYOND, Cell, Fitting, Layout, bond
@@ -36,7 +37,7 @@ from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
 from unitcad.moulds.cup import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
-from unitcad.moulds.cuts import BESIDE, Feature, Interval, Seam, Split, split, strips, unseen
+from unitcad.moulds.cuts import BESIDE, Feature, Interval, Seam, split, strips, unseen
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
 from unitcad.moulds.pieces import (
     CAST,
@@ -118,8 +119,8 @@ def drawing_of(array: Array) -> Drawing:
 def _cut(drawn: Drawing) -> Drawing:
     """Return the drawing with its seams, and with enough pins that each piece of base and cups has two."""
     moulds, array, (x, y), plate = drawn.spec.moulds, drawn.array, drawn.lay.cup, drawn.lay.plate
-    kept = [*of_sheet(array), *_beside(drawn)]
-    slots = [_slot(drawn, fin) for fin in drawn.fins]
+    kept, play = [*of_sheet(array), *_beside(drawn)], moulds.plinth_clearance_mm
+    slots = [box_feature(*fin.taken(fin.reach + play, play)) for fin in drawn.fins]
     bore = drawn.dims.outer_radius
     grooved = round_units(array, [bore + moulds.land_mm + moulds.groove_width_mm] * len(array.places))
     clear, close = [*grooved, *slots, *kept], [*round_units(array, [bore] * len(array.places)), *slots, *kept]
@@ -185,42 +186,25 @@ def _more_pins(drawn: Drawing) -> list[Point]:
 
 
 def _beside_slots(drawn: Drawing, side: Side, middles: Sequence[float], within: Interval, count: int) -> list[float]:
-    """Return the places of pins on a side, as `_spots`, clear of its pry slots: at units' middles if possible."""
+    """Return places of pins on a side, spread evenly and clear of its pry slots: at units' middles if possible."""
     by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
     slots = [slot.middle for slot in drawn.pry if slot.side == side]
     steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
-    for tried in (middles, (*steps, *(at + sign * by for at in slots for sign in (-1, 1)))):
-        found = _spots([at for at in tried if all(abs(at - slot) >= by - 1e-9 for slot in slots)], within, count)
-        if found:
-            return found
-    return []
-
-
-def _spots(middles: Sequence[float], within: Interval, count: int) -> list[float]:
-    """Return as many units' middles as asked for, the nearest to places spread evenly within an interval."""
     low, high = within[0] + 2 * PIN_RADIUS, within[1] - 2 * PIN_RADIUS
-    inside = [middle for middle in middles if low < middle < high]
     wanted = [low + (high - low) * (2 * k + 1) / (2 * count) for k in range(count)]
-    return sorted({min(inside, key=lambda middle, at=at: abs(middle - at)) for at in wanted}) if inside else []
-
-
-def _slot(drawn: Drawing, fin: Fin) -> Feature:
-    """Return the space of a fin's slot."""
-    clearance = drawn.spec.moulds.plinth_clearance_mm
-    return box_feature(*fin.taken(fin.reach + clearance, clearance))
+    for tried in (middles, (*steps, *(at + sign * by for at in slots for sign in (-1, 1)))):
+        free = [at for at in tried if low < at < high and all(abs(at - slot) >= by - 1e-9 for slot in slots)]
+        if free:
+            return sorted({min(free, key=lambda at, place=place: abs(at - place)) for place in wanted})
+    return []
 
 
 UP, DOWN = (0, 0, 1), (0, 0, -1)
 
 
-def core_top(spec: Spec) -> float:
-    """Return the height of cores and fins over the skin, mm: motor and circuit are under it."""
-    return dimensions(spec).core_height
-
-
 def slot_roof(spec: Spec) -> float:
     """Return the height of the slots that the cups have for the fins, mm."""
-    return core_top(spec) + spec.moulds.plinth_clearance_mm
+    return dimensions(spec).core_height + spec.moulds.plinth_clearance_mm
 
 
 def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") -> Plan:
@@ -262,6 +246,7 @@ def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") 
             )
         )
     bar = blade(lay, dims.heights[pours - 1])
+    seamed = (base, drawing.base_seams), *((cup, drawing.cup_seams) for cup in cups)
     return Plan(
         (base, *cups, *filaments, blade_piece(bar, too_long=longer_than_bed(spec, 2 * lay.plate[1]))),
         tuple(steps),
@@ -272,15 +257,8 @@ def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") 
         pins=drawing.pins,
         pry_slots=tuple((slot.piece, slot.side, slot.middle) for slot in drawing.pry),
         genus=(("base", len(filaments)), *((cup.name, len(lay.cells)) for cup in cups)),
-        splits=tuple(_splits(drawing, base, cups)),
+        splits=tuple(split(tool, where) for tool, where in seamed if where),
     )
-
-
-def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Split]:
-    """Yield the tools that are larger than the bed, cut."""
-    for tool, where in ((base, drawing.base_seams), *((cup, drawing.cup_seams) for cup in cups)):
-        if where:
-            yield split(tool, where)
 
 
 def _base_letters(drawing: Drawing, label: str) -> Iterator[Shape]:
@@ -334,9 +312,7 @@ def _cup(drawing: Drawing, layer: int, *, last: bool) -> Shape:
     rim = dims.heights[layer]
     tools = [*_bores(drawing, layer, last=last), *_slots(drawing), *pin_holes(drawing.pins)]
     if last:
-        land, depth = spec.moulds.land_mm, groove_depth_of(spec, rim)
-        around = rounded(sheet.outline, sheet.corner_mm, land + spec.moulds.groove_width_mm)
-        tools.append(Extrude(around, rim - depth, rim + BEYOND, (rounded(sheet.outline, sheet.corner_mm, land),)))
+        tools.append(draw_groove(sheet, spec, rim))
     else:
         tools += _grooves(drawing, layer)
     return cut(Extrude(outline(lay.cup, MARK), 0.0, rim), tools)
@@ -349,8 +325,7 @@ def _bores(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
     top = sheet.low + (rim - sheet.low) / 2 if last else rim + BEYOND
     shapes = [moved(cylinder(dims.radii[layer], -BEYOND, top), cell.x, cell.y) for cell in drawing.lay.cells]
     if last:
-        posts = tuple(slot_profile(slot) for slot in sheet.strap_slots)
-        shapes.append(Extrude(rounded(sheet.outline, sheet.corner_mm), sheet.low, rim + BEYOND, posts))
+        shapes.append(draw_sheet(sheet, sheet.low, rim + BEYOND))
     return shapes
 
 
@@ -451,11 +426,6 @@ def fins(array: Array) -> tuple[Fin, ...]:
     )
 
 
-def least_apart(spec: Spec) -> float:
-    """Return the least distance between the edges of two units whose fins come to meet each other, mm."""
-    return 2 * (SEAL + spec.moulds.plinth_clearance_mm) + spec.moulds.least_wall_mm
-
-
 def _ways(array: Array, circuit: Wiring) -> Iterator[tuple[int, tuple[int, int], float]]:
     """Yield place, direction and the strip's half width for every way out of a unit."""
     for strip in circuit.strips:
@@ -470,8 +440,6 @@ def _ways(array: Array, circuit: Wiring) -> Iterator[tuple[int, tuple[int, int],
                         yield i, (round(sense * ux), round(sense * uy)), strip.half
 
 
-STEP = 0.5
-"""Between two places that are tried for a slot, mm."""
 LEAST_DEPTH = 0.8
 """Of a slot over a filament's groove, mm: the tip of a thin screwdriver still gets in (assumed)."""
 
@@ -565,7 +533,7 @@ def _depth(spec: Spec, lay: Layout, side: Side, middle: float) -> float:
 def apart(unit: Spec) -> tuple[float, str]:
     """Return the least distance of two units' edges, mm, and why."""
     spine = unit.fpcb.tail_width_mm + 2 * CLEAR if unit.fpcb else 0.0
-    gap = least_apart(unit)
+    gap = 2 * (SEAL + unit.moulds.plinth_clearance_mm) + unit.moulds.least_wall_mm
     if spine > gap:
         return spine, f"between two units a spine of the circuit, as wide as a tail, takes {spine:.4g} mm"
     return gap, f"between two units the fins of the circuit's notches and a wall of the cups take {gap:.4g} mm"
@@ -595,13 +563,12 @@ def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
     drawn = [of_unit[f"layer{i + 1}"] for i in range(len(spec.layers))]
     notches: list[list[Shape]] = [[] for _ in array.places]
     for fin in fins(array):
-        notches[fin.place].append(fin.drawn(dims.outer_radius + BEYOND, 0.0, -BEYOND, core_top(spec)))
+        notches[fin.place].append(fin.drawn(dims.outer_radius + BEYOND, 0.0, -BEYOND, dims.core_height))
     pours = [
         tuple(cut(moved(shape, place.x, place.y), own) for place, own in zip(array.places, notches, strict=True))
         for shape in drawn
     ]
-    holes = tuple(slot_profile(slot) for slot in sheet.strap_slots)
-    back = Extrude(rounded(sheet.outline, sheet.corner_mm), sheet.low, sheet.high, holes)
+    back: Shape = draw_sheet(sheet, sheet.low, sheet.high)
     if len(drawn) > 1 and sheet.low < dims.heights[-2]:
         inner = [moved(cylinder(dims.radii[-2], -BEYOND, dims.heights[-2]), p.x, p.y) for p in array.places]
         back = cut(back, inner)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.constructions import Construction, Level, back_sheet
-from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, core_top, fins
+from unitcad.arrays.constructions import Level, back_sheet
+from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, fins
 from unitcad.arrays.sheet import angle_deg, axis, barrel, bent, bent_stretches, inside_of_end, slice_of, strap_slot
 from unitcad.catalogue import printers
 from unitcad.designs import Dimensions, design_of, dimensions
@@ -40,50 +40,25 @@ MOST_DEG = 75.0
 """Of the sheet's ends from the top, at most (assumed): beyond it lid and base slide on each other as they close."""
 
 
-def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> None:
-    """Raise Refusal for a limb too small or too large.
-
-    `apart`: between two units' feet, mm. `middle`: from the limb's radius to that of the sheet's middle, mm.
-    """
-    radius = array.radius_mm or 0.0
-    _check_vents(array, radius, middle)
-    if not (why := _too_small(array, radius, apart, middle(radius))):
-        return
-    raise Refusal("limb.radius_mm", radius, why)
-
-
-def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) -> None:
-    """Raise Refusal for a limb so large that a tilt of the mould brings the highest line off the sheet, and its vents.
-
-    `middle` as in `check_limb`.
-    """
-    largest = _largest_middle(array)
-    if middle(radius) <= largest:
-        return
-    end = math.degrees(largest / middle(radius)) * math.radians(TILT_DEG)
-    why = (
-        f"the sheet reaches {end:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps air at "
-        "its ends; cast it flat and bend it"
-    )
-    raise Refusal("limb.radius_mm", radius, why)
-
-
-def _largest_middle(array: Array) -> float:
-    """Return the radius of the sheet's middle with which its nearer end is within the tilt from the top, mm."""
-    return min(-array.sheet.outline[0], array.sheet.outline[2]) / math.radians(TILT_DEG)
-
-
-def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
-    """Return the objection to a limb of a radius, with the sheet's middle at the radius `middle` (mm), or ""."""
-    sheet = array.sheet
+def _objections(array: Array) -> Iterator[str]:
+    """Yield the objections to a limb: so large that a tilt brings the highest line off the vents, or too small."""
+    sheet, radius = array.sheet, array.radius_mm or 0.0
+    low, high, _ = level((array.unit,), sheet.thickness_mm, radius)
+    middle = radius + (low + high) / 2
+    nearer, farther = (math.degrees(end / middle) for end in sorted((-sheet.outline[0], sheet.outline[2])))
+    if nearer < TILT_DEG:
+        yield (
+            f"the sheet reaches {nearer:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps "
+            "air at its ends; cast it flat and bend it"
+        )
     steepest = float(printer_of(array.unit).overhang_deg)
     places = [place.x for place in array.places] + [(slot[0] + slot[2]) / 2 for slot in sheet.strap_slots]
     tilt = math.degrees(max(map(abs, places)) / middle)
     if tilt > steepest + 1e-9:
-        return f"the outermost unit or slot is tilted by {tilt:.3g} degrees; from {steepest:g} on it needs support"
-    end = math.degrees(max(-sheet.outline[0], sheet.outline[2]) / middle)
-    if end > MOST_DEG + 1e-9:
-        return f"the sheet reaches {end:.3g} degrees from the top; lid and base close up to {MOST_DEG:g}"
+        yield f"the outermost unit or slot is tilted by {tilt:.3g} degrees; from {steepest:g} on it needs support"
+    if farther > MOST_DEG + 1e-9:
+        yield f"the sheet reaches {farther:.3g} degrees from the top; lid and base close up to {MOST_DEG:g}"
+    apart, _ = back_sheet.apart(array.unit)
     for one, other in combinations(array.places, 2):
         outer, turn = one.radius + other.radius, abs(other.x - one.x) / middle / 2
         if turn >= math.pi / 2 or abs(other.y - one.y) > outer + apart:
@@ -94,8 +69,7 @@ def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
         gap = distance - outer * math.hypot(math.cos(turn) * across, along) / distance
         if gap < apart - 2 / 1024:
             there = f"{gap:.3g}" if gap < apart - 0.05 else f"{gap:.5g}"
-            return f"at the skin {one.name} and {other.name} are {there} mm apart and need {apart:.4g} mm"
-    return ""
+            yield f"at the skin {one.name} and {other.name} are {there} mm apart and need {apart:.4g} mm"
 
 
 BESIDE = 1 / 4
@@ -152,11 +126,6 @@ class Former:
         return self.array.back_radius_mm
 
     @property
-    def front(self) -> float:
-        """Radius of the sheet's side towards the skin."""
-        return (self.array.radius_mm or 0.0) + self.array.sheet.low
-
-    @property
     def top(self) -> float:
         """Z of the lid's upper face."""
         return self.array.sheet.high + THICKNESS
@@ -167,19 +136,15 @@ def plan(array: Array) -> Plan:
 
     Raises Refusal for tools that are larger than the bed, and for a limb too small.
     """
-
-    def middle(radius: float) -> float:
-        there = level((array.unit,), array.sheet.thickness_mm, radius)
-        return radius + (there.low + there.high) / 2
-
-    check_limb(array, back_sheet.apart(array.unit)[0], middle)
+    if why := next(_objections(array), ""):
+        raise Refusal("limb.radius_mm", array.radius_mm, why)
     former, flat, (*laid, (poured,)) = _former(array), back_sheet.layers(array)[:-1], layers(array)
     pour = len(flat) + 1
     base, lid = _base(former), _lid(former)
     label = set_label((base, lid, poured, *(shape for shapes in flat for shape in shapes)))
     base = base_piece(engrave(base, _letters(former, f"B{pour:X}{label}", former.seat)))
     lid = lid_piece(pour, engrave(lid, _letters(former, f"L{pour:X}{label}", former.top)))
-    ways = [_down(axis(array, place.x)) for place in array.places]
+    ways = [(-x, -y, -z) for x, y, z in (axis(array, place.x) for place in array.places)]
     filaments = [
         replace(piece, removal=way) for piece, way in zip(filament_pieces(_filaments(former)), ways, strict=True)
     ]
@@ -217,11 +182,6 @@ def plan(array: Array) -> Plan:
     )
 
 
-def _down(way: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = way
-    return -x, -y, -z
-
-
 def _former(array: Array) -> Former:
     """Return the dimensions of base and lid. Raises Refusal for plates beyond the bed."""
     spec, moulds, sheet = array.unit, array.unit.moulds, array.sheet
@@ -236,7 +196,9 @@ def _former(array: Array) -> Former:
     # The label is between the pins at one end.
     label = text_width("B2F055", moulds.engraving_stroke_mm) / 2 + 1.0 + beside
     half = mm(edge + beside), mm(max(max(-y0, y1) + LAND, label))
-    lowest = min([seat - moulds.plate_mm, *(_lowest(array, place.x, dims.outer_radius) for place in array.places)])
+    turns = [math.radians(abs(angle_deg(array, place.x))) for place in array.places]
+    moats = (radius * math.cos(turn) - dims.outer_radius * math.sin(turn) - radius for turn in turns)
+    lowest = min(seat - moulds.plate_mm, *moats)
     under = max(moulds.plate_mm, GRIP_RADIUS + moulds.least_wall_mm)
     bottom = mm(seat - math.ceil((seat - lowest + under) / moulds.layer_mm) * moulds.layer_mm)
     x, y = edge + beside / 2, half[1] - hole - 2 * moulds.least_wall_mm
@@ -268,31 +230,20 @@ def _rows_that_fit(array: Array, length: float) -> int:
     return max(0, len(rows) - math.ceil((length - bed) / (rows[1] - rows[0]) - 1e-6))
 
 
-def _lowest(array: Array, x: float, outer: float) -> float:
-    """Return z of the lowest point of a unit's moat."""
-    radius, turn = array.radius_mm or 0.0, math.radians(angle_deg(array, x))
-    return radius * math.cos(turn) - outer * math.sin(abs(turn)) - radius
-
-
-def _block(former: Former) -> Shape:
-    """Draw the base's outside: a block up to the seat, and the barrel over it."""
+def _base(former: Former) -> Shape:
+    """Draw the base: a block up to the seat and the barrel over it, less the sheet, the moats and filaments' ways."""
     (x, y), seat, bottom = former.half, former.seat, former.bottom
     over = Common((barrel(former.array, former.back), box(-x, x, -y, y, bottom + BEYOND, former.top)))
-    return union((box(-x, x, -y, y, bottom, seat), over, *standing_pins(former.pins)))
+    block = union((box(-x, x, -y, y, bottom, seat), over, *standing_pins(former.pins)))
+    return cut(block, [_between_ends(former.array, 2 * BEYOND), *_moats(former), *_filament_ways(former)])
 
 
-def _base(former: Former) -> Shape:
-    """Draw the base: the sheet's bed with posts for strap slots, a moat a unit with core and fins, filaments' ways."""
-    return cut(_block(former), [_bed(former), *_moats(former), *_filament_ways(former)])
-
-
-def _bed(former: Former) -> Shape:
-    """Draw the sheet's space in the base."""
-    array = former.array
+def _between_ends(array: Array, beyond: float, *within: Shape) -> Shape:
+    """Draw the sheet's space over its front and `within` others; posts of strap slots are longer by `beyond`, mm."""
     sheet = array.sheet
-    posts = [strap_slot(array, slot, 2 * BEYOND) for slot in sheet.strap_slots]
-    room = Common((inside_of_end(array, left=True), inside_of_end(array, left=False)))
-    return cut(room, [barrel(array, former.front), *posts])
+    slots = [strap_slot(array, slot, beyond) for slot in sheet.strap_slots]
+    room = Common((*within, inside_of_end(array, left=True), inside_of_end(array, left=False)))
+    return cut(room, [barrel(array, (array.radius_mm or 0.0) + sheet.low), *slots])
 
 
 def _moats(former: Former) -> list[Shape]:
@@ -351,15 +302,11 @@ def _channels(former: Former, low: float, top: float) -> list[Shape]:
 
 def _vent_off_end(former: Former, x: float) -> float:
     """Return the distance of a vent's edge from the sheet's end, along the limb, at a place across its top, mm."""
-    return _off_end(former, abs(x) + VENT / 2) + VENT_OFF_END
-
-
-def _off_end(former: Former, x: float) -> float:
-    """Return how far the round corners make the sheet shorter along the limb at a place across its top, mm."""
-    sheet, back = former.array.sheet, former.back
+    sheet, back, edge = former.array.sheet, former.back, abs(x) + VENT / 2
+    # Round corners make the sheet shorter there.
     r, end = sheet.corner_mm, math.radians(angle_deg(former.array, min(-sheet.outline[0], sheet.outline[2])))
-    beside = r - back * math.sin(end - math.asin(x / back))
-    return r - math.sqrt(r**2 - beside**2) if beside > 0 else 0.0
+    beside = r - back * math.sin(end - math.asin(edge / back))
+    return (r - math.sqrt(r**2 - beside**2) if beside > 0 else 0.0) + VENT_OFF_END
 
 
 def _vents(former: Former) -> list[float]:
@@ -368,7 +315,8 @@ def _vents(former: Former) -> list[float]:
     limit = MESH_ROOM * deepest(former.spec, len(former.spec.layers) - 1)
     # An odd number of vents puts one in the middle, if none is nearer to the end.
     at_end = max(limit, _kept_at_end(former, [0.0]))
-    while _kept_between(former, count) > limit or _kept_at_end(former, places) > at_end:
+    # Between two vents air stays up to halfway, tilted round the limb.
+    while former.back * (1 - math.cos(math.radians(TILT_DEG / count))) > limit or _kept_at_end(former, places) > at_end:
         count += 1
         places = _spread(former, count)
     return places
@@ -378,11 +326,6 @@ def _spread(former: Former, count: int) -> list[float]:
     """Return places across the top at equal angles from each other, within the tilt to either side, mm."""
     step = 2 * TILT_DEG / count
     return [former.back * math.sin(math.radians(step * (k + 0.5) - TILT_DEG)) for k in range(count)]
-
-
-def _kept_between(former: Former, count: int) -> float:
-    """Return how deep the air is halfway between two of so many vents, tilted round the limb, mm."""
-    return former.back * (1 - math.cos(math.radians(TILT_DEG / count)))
 
 
 def _kept_at_end(former: Former, places: list[float]) -> float:
@@ -406,20 +349,15 @@ def _lid(former: Former) -> Shape:
 
 
 def _seals(former: Former) -> list[Shape]:
-    """Draw seals at joints that meet only up to rounding: under and in the inserted layers."""
-    array, dims = former.array, former.dims
-    drawn = cylinder(dims.radii[-2] - JOINT, -JOINT, dims.heights[-2] - JOINT)
-    return [*(bent(array, drawn, place.x, place.y) for place in array.places), *_land_seals(former)]
-
-
-def _land_seals(former: Former) -> list[Shape]:
-    """Draw the space of the pressed joint of lid and base next to the sheet, round the limb and along it."""
-    array, (x, y) = former.array, former.half
+    """Draw seals at joints that meet only up to rounding: under and in the inserted layers, and lid on base."""
+    array, dims, (x, y) = former.array, former.dims, former.half
+    laid = cylinder(dims.radii[-2] - JOINT, -JOINT, dims.heights[-2] - JOINT)
     x0, y0, x1, y1 = array.sheet.outline
     joint = cut(barrel(array, former.back + JOINT), [barrel(array, former.back - JOINT)])
     land = Common((joint, box(-x, x, -y, y, former.seat, former.top)))
     beside = [box(-x, x, low, high, former.seat, former.top) for low, high in ((-y, y0 - JOINT), (y1 + JOINT, y))]
-    return [Common((land, union(beside))), cut(land, [slice_of(array, x0 - JOINT, x1 + JOINT)])]
+    lands = Common((land, union(beside))), cut(land, [slice_of(array, x0 - JOINT, x1 + JOINT)])
+    return [*(bent(array, laid, place.x, place.y) for place in array.places), *lands]
 
 
 def _letters(former: Former, label: str, top: float) -> list[Shape]:
@@ -442,7 +380,7 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
         raise Refusal("limb.cast", "curved", limit, "flat")
     top = math.hypot(limb + flat.high, dims.radii[-2]) - limb
     # Next to its unit a notch stays under the sheet.
-    roof = math.hypot(limb + core_top(spec), dims.outer_radius + BEYOND) - limb
+    roof = math.hypot(limb + dims.core_height, dims.outer_radius + BEYOND) - limb
     return Level(top - thickness, top, top - roof)
 
 
@@ -462,10 +400,12 @@ def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
 
 def _notches(array: Array, beyond: float) -> list[list[Shape]]:
     """Draw the notches of the circuit at each place, about the z axis, `beyond` unit and skin by so much (mm)."""
-    reach, top = dimensions(array.unit).outer_radius + beyond, core_top(array.unit)
+    dims = dimensions(array.unit)
     found: list[list[Shape]] = [[] for _ in array.places]
     for fin in fins(array):
-        found[fin.place].append(fin._replace(x=0.0, y=0.0).drawn(reach, 0.0, -beyond, top))
+        found[fin.place].append(
+            fin._replace(x=0.0, y=0.0).drawn(dims.outer_radius + beyond, 0.0, -beyond, dims.core_height)
+        )
     return found
 
 
@@ -474,11 +414,7 @@ def _poured(array: Array, notches: Sequence[Sequence[Shape]]) -> Shape:
     sheet, spec, radius = array.sheet, array.unit, array.radius_mm or 0.0
     dims = dimensions(spec)
     inner, height, outer = dims.radii[-2], dims.heights[-2], dims.outer_radius
-    holes = [strap_slot(array, slot, BEYOND) for slot in sheet.strap_slots]
-    back = Common(
-        (barrel(array, array.back_radius_mm), inside_of_end(array, left=True), inside_of_end(array, left=False))
-    )
-    back = cut(back, [barrel(array, radius + sheet.low), *holes])
+    back = _between_ends(array, BEYOND, barrel(array, array.back_radius_mm))
     rounds = [bent(array, cylinder(outer, 0.0, sheet.high + BEYOND), p.x, p.y) for p in array.places]
     rounds = Common((barrel(array, radius + (sheet.low + sheet.high) / 2), union(rounds)))
     hollow: list[Shape] = []
@@ -497,17 +433,12 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
     return replace(solder, text=f"{solder.text} {flat}"), lay_in
 
 
-CONSTRUCTION = Construction(
-    name="back-sheet",
+CONSTRUCTION = replace(
+    back_sheet.CONSTRUCTION,
     cast="curved",
     about="a back sheet cast round the limb: Layer 1 is cast flat and laid in, the rest is injected under a lid",
-    mixed=False,
-    own_tails=False,
-    thickness_mm=1.25,
-    apart=back_sheet.apart,
     level=level,
     bodies=lambda array: back_sheet.pour_bodies(layers(array)),
     plan=plan,
     assembly=assembly,
-    greased=back_sheet.seal_places,
 )

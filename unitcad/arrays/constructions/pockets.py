@@ -16,9 +16,9 @@ from unitcad.arrays.piece_seams import (
     sheet_mm2,
     too_much,
 )
-from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile
+from unitcad.arrays.sheet import bent_stretches, draw_groove, rounded, slot_profile
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, unit_bodies
-from unitcad.designs.design import Cell, Layout
+from unitcad.designs.design import BEYOND, Cell, Layout
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise, segment_count, thick_pieces
 from unitcad.moulds.cavities import united
@@ -32,8 +32,6 @@ from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.text import number
 
-BEYOND = 1.0
-"""Excess of a cutting tool over its cut, and of a core into the floor, mm."""
 MARGIN = 1.0
 """Distance of a label from its edge, mm."""
 
@@ -93,22 +91,14 @@ def hold_strain(radius: float, hold: float) -> float:
 
 def tray(array: Array) -> Shape:
     """Draw the tray without its label."""
-    sheet, moulds = array.sheet, array.unit.moulds
-    rim, land = sheet.thickness_mm, moulds.land_mm
-    outer = _outer(array)
-    block = Extrude(rounded(outer, sheet.corner_mm + outer[2] - sheet.outline[2]), -moulds.plate_mm, rim)
+    sheet, rim, outer = array.sheet, array.sheet.thickness_mm, _outer(array)
+    block = Extrude(rounded(outer, sheet.corner_mm + outer[2] - sheet.outline[2]), -array.unit.moulds.plate_mm, rim)
     cavity = Extrude(rounded(sheet.outline, sheet.corner_mm), 0.0, rim + BEYOND)
-    groove = Extrude(
-        rounded(sheet.outline, sheet.corner_mm, land + moulds.groove_width_mm),
-        rim - groove_depth_of(array.unit, rim),
-        rim + BEYOND,
-        (rounded(sheet.outline, sheet.corner_mm, land),),
-    )
     cores: list[Shape] = [
         moved(cylinder(place.radius - sheet.hold_mm, -BEYOND, rim), place.x, place.y) for place in array.places
     ]
     cores += [Extrude(slot_profile(slot), -BEYOND, rim) for slot in sheet.strap_slots]
-    return cut(union((cut(block, [cavity]), *cores)), [groove])
+    return cut(union((cut(block, [cavity]), *cores)), [draw_groove(sheet, array.unit, rim)])
 
 
 def _outer(array: Array) -> Box:
