@@ -10,13 +10,14 @@ from msgspec import Meta
 
 from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal
-from unitcad.files import sha256
+from unitcad.files import path_seen_from, sha256
 from unitcad.lab.readers import Quantity, expect_ending, to_si
-from unitcad.lab.unit_files import File, Name, file_of
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
 from unitcad.validation.load import load_file
 
+Name = Annotated[str, Meta(min_length=1, max_length=100)]
+File = Annotated[str, Meta(min_length=1, max_length=1000)]
 Records = Annotated[tuple[File, ...], Meta(max_length=1000)]
 Positive = Annotated[float, between(1e-12, 1e12)]
 Column = Annotated[int, between(1, 4096)] | Name
@@ -124,6 +125,14 @@ def _campaign_of(data: dict[str, Any]) -> Campaign:
             limit = both if unit.reference else "is required, or recording.motor_channel"
             raise Refusal(f"{field}.reference", list(unit.reference) or None, limit)
     return campaign
+
+
+def file_of(folder: Path, name: str, field: str) -> Path:
+    """Return the path of a file that a lab's file in `folder` names. Raises Refusal if there is none."""
+    path = folder / name
+    if not path.is_file():
+        raise Refusal(field, name, f"no such file in {path_seen_from(folder)}")
+    return path
 
 
 def check_files(campaign: Campaign, folder: Path) -> None:
