@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
+from scipy.signal import lfilter, sosfilt
 
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.chains import Chain, ChainTable, bandpass, line
-from unitcad.lab.chains.line import fit_line
+from unitcad.lab import bandpass
+from unitcad.lab.line import coarse_frequency, fit_line
 
 BAND_HZ = (60.0, 250.0)
 
@@ -33,8 +33,6 @@ def flat_top(x: Floats, rate: float) -> float:
 
 def lock_in(x: Floats, rate: float) -> float:
     """Return the product with a carrier at the spectrum's peak, of fixed frequency, averaged over the inner 80 %."""
-    from unitcad.lab.chains.line import coarse_frequency
-
     frequency = coarse_frequency(x, rate, BAND_HZ, 50.0)
     inner = slice(len(x) // 10, len(x) - len(x) // 10)
     window = np.hanning(len(x[inner]))
@@ -42,25 +40,38 @@ def lock_in(x: Floats, rate: float) -> float:
     return float(2 * abs(np.sum(turned * window)) / window.sum())
 
 
-def _of(chain: Chain) -> Callable[[Floats, float], float]:
-    """Return a chain's amplitude of a record; 0 where there is no line."""
+def peak_bandpass(x: Floats, rate: float) -> float:
+    """Return half the peak-to-peak of the chain `bandpass`, over the whole record."""
+    return float(np.ptp(bandpass.filtered(bandpass.resampled(x, rate))) / 2)
 
-    def amplitude(x: Floats, rate: float) -> float:
-        fit = fit_line(x, rate)
-        return chain.amplitude(x, rate, fit) if fit else 0.0
 
-    return amplitude
+def trimmed_peak_bandpass(x: Floats, rate: float) -> float:
+    """Return half the peak-to-peak of the chain `bandpass`, without the ends."""
+    return float(np.ptp(bandpass.filtered(bandpass.resampled(x, rate))[_INNER]) / 2)
+
+
+def causal_bandpass(x: Floats, rate: float) -> float:
+    """Return the RMS of the chain `bandpass` whose filters run only forwards."""
+    band, comb = bandpass.filters()
+    return float(np.sqrt(2) * np.std(np.asarray(lfilter(*comb, sosfilt(band, bandpass.resampled(x, rate))))[_INNER]))
+
+
+_INNER = slice(round(bandpass.TRIM_S * bandpass.RATE_HZ), -round(bandpass.TRIM_S * bandpass.RATE_HZ))
+
+
+def line(x: Floats, rate: float) -> float:
+    """Return the amplitude by the chain `line`; 0 without a line."""
+    fit = fit_line(x, rate)
+    return fit.amplitude if fit else 0.0
 
 
 CHAINS: dict[str, Callable[[Floats, float], float]] = {
-    "bandpass, zero-phase, half peak-to-peak, whole record": partial(
-        bandpass.amplitude, ChainTable(measure="peak", trim_s=0.0)
-    ),
-    "same, ends trimmed": partial(bandpass.amplitude, ChainTable(measure="peak")),
-    "bandpass, zero-phase, RMS, trimmed": partial(bandpass.amplitude, ChainTable()),
-    "bandpass, causal, RMS, trimmed": partial(bandpass.amplitude, ChainTable(zero_phase=False)),
+    "bandpass, zero-phase, half peak-to-peak, whole record": peak_bandpass,
+    "same, ends trimmed": trimmed_peak_bandpass,
+    "bandpass, zero-phase, RMS, trimmed": bandpass.amplitude,
+    "bandpass, causal, RMS, trimmed": causal_bandpass,
     "FFT peak, rectangular window": fft_peak,
     "FFT, flat-top window": flat_top,
     "lock-in, fixed frequency": lock_in,
-    "line": _of(line.chain(ChainTable())),
+    "line": line,
 }

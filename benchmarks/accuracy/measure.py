@@ -20,8 +20,8 @@ from benchmarks.accuracy.synthetic_records import (
     synthetic,
 )
 from unitcad.accuracy.measurements import PROCESSOR, PROCESSOR_NOTE
-from unitcad.lab.chains import ChainTable, bandpass
-from unitcad.lab.chains.line import fit_line
+from unitcad.lab import bandpass
+from unitcad.lab.line import fit_line
 from unitcad.lab.measuring import level
 
 SEED = 20240
@@ -61,7 +61,7 @@ def run(quick: bool, say: Say) -> Result:
         coverage.append(_coverage(scenario, trials))
     say("levels")
     repeats = [_level_coverage(count, 1000 if quick else 10000) for count in (3, 5)]
-    gains = [(hz, bandpass.gain(ChainTable(), hz), bandpass.gain(ChainTable(zero_phase=False), hz)) for hz in _GAIN_HZ]
+    gains = [(hz, bandpass.gain(hz), bandpass.gain(hz) ** 0.5) for hz in _GAIN_HZ]
     return Result(
         suite="measure",
         title="Signal chains of a measurement",
@@ -146,12 +146,8 @@ def run(quick: bool, say: Say) -> Result:
                 "Hz",
                 "gain",
                 {
-                    "forwards and backwards": tuple(
-                        (hz, max(bandpass.gain(ChainTable(), hz), 1e-4)) for hz in _FINE_HZ
-                    ),
-                    "forwards": tuple(
-                        (hz, max(bandpass.gain(ChainTable(zero_phase=False), hz), 1e-4)) for hz in _FINE_HZ
-                    ),
+                    "forwards and backwards": tuple((hz, max(bandpass.gain(hz), 1e-4)) for hz in _FINE_HZ),
+                    "forwards": tuple((hz, max(bandpass.gain(hz) ** 0.5, 1e-4)) for hz in _FINE_HZ),
                 },
                 curves=("forwards and backwards", "forwards"),
                 linear_x=True,
@@ -169,7 +165,7 @@ def run(quick: bool, say: Say) -> Result:
             ),
             *(Promise(f"level from {r[0]} + {r[0]}: part outside 95 %", round(1 - r[1], 6), 0.06) for r in repeats),
             *(Promise(f"level from {r[0]} + {r[0]}: part within 95 %", r[1], 0.98) for r in repeats),
-            Promise("bandpass: gain at 100 Hz", bandpass.gain(ChainTable(), 100.0), 1e-6),
+            Promise("bandpass: gain at 100 Hz", bandpass.gain(100.0), 1e-6),
         ),
         measured={**machine("numpy", "scipy"), "records": trials, "seed": SEED},
         summary=_summary(rows, coverage),

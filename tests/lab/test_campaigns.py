@@ -18,7 +18,6 @@ from tests.refusals import refuses
 from unitcad.files import sha256
 from unitcad.lab import measure_command, measuring
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.chains import CHAINS
 from unitcad.lab.measuring import level, measure
 from unitcad.lab.record import RULES
 
@@ -69,7 +68,7 @@ def test_a_campaign_has_the_levels_of_its_truth(folder):
     assert len(result.levels) == 4
     for record in result.records["a"]:
         assert record.u_um < 0.02 * record.amplitude_um
-        assert record.gains["bandpass"] == pytest.approx(1.0, abs=0.01)
+        assert record.bandpass_gain == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_files_of_a_campaign(folder, monkeypatch):
@@ -81,9 +80,9 @@ def test_the_files_of_a_campaign(folder, monkeypatch):
     assert files == {file.name: file.read_bytes() for file in Path("two").iterdir()}
     measured = tomllib.loads(files["measured.toml"].decode())
     assert {level["status"] for level in measured["level"]} == {"measured"}
-    assert measured["assumed"] == {"order": 4, "q": 30.0, "zero_phase": True, "measure": "rms", "trim_s": 0.25}
     assert [one["sha256"] for one in measured["record"]] == [sha256(Path(one["file"])) for one in measured["record"]]
     assert set(files) == {"measured.toml", "measure.json", "measure.html"}
+    assert "assumed: order 4, Q 30, filters forwards and backwards, RMS, 0.25 s" in done.stdout
     page = files["measure.html"].decode().replace("http://www.w3.org/2000/svg", "")
     assert not [part for part in ("http://", "<script") if part in page]
     again = json.loads(unitcad("measure", "c.toml", "--json").stdout)
@@ -97,7 +96,7 @@ def test_a_motor_channel_gives_the_ratio(tmp_path):
         write(tmp_path / f"e{i}.wav", 0.35 * (1 + 0.01 * (i - 1)) * np.roll(motor, 1) + noise(seed=50 + i), motor)
     result = campaign(tmp_path, PAIRED)
     assert result.levels[0].level.value == pytest.approx(0.35, rel=2e-3)
-    assert result.records["a"][1].ratio == pytest.approx(0.35, rel=1e-3)
+    assert result.records["a"][1].by_chain["line"] == pytest.approx(0.35, rel=1e-3)
 
 
 def test_a_levels_interval_is_welchs():
@@ -110,31 +109,6 @@ def test_a_levels_interval_is_welchs():
     pairs = level([a / b for a, b in zip(edge, motor, strict=False)])
     paired = ttest_rel(np.log(edge[:3]), np.log(motor)).confidence_interval(0.95)
     assert (pairs.low, pairs.high) == pytest.approx((math.exp(paired.low), math.exp(paired.high)), rel=1e-9)
-
-
-def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):
-    """A chain that reads the standard deviation: its name, gain, levels and refusals come with the entry."""
-    (tmp_path / "rms_chain.py").write_text(
-        "import numpy as np\n"
-        "from unitcad.lab.chains import Chain\n"
-        "def chain(table):\n"
-        "    broken = 'it is out of order' if table.q == 7 else ''\n"
-        "    rms = lambda x, rate, fit: float(np.sqrt(2) * np.std(x))\n"
-        "    return Chain('rms', rms, unfit=lambda fits: broken, gain=lambda hertz: 0.95)\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    repeats(tmp_path, m=wave(300), e=wave(90))
-    use = BOTH.replace("bandpass", "rms")
-    with refuses("chain.use.1", "rms"):
-        campaign(tmp_path, use + UNIT)
-    monkeypatch.setitem(CHAINS, "rms", "rms_chain:chain")
-    result = campaign(tmp_path, use + UNIT)
-    levels = {one.chain: one.level.value for one in result.levels}
-    assert levels["rms"] == pytest.approx(levels["line"], rel=1e-3)
-    assert result.records["a"][0].gains == {"rms": 0.95}
-    result = campaign(tmp_path, f"{use}q = 7.0\n{UNIT}")
-    assert [one.chain for one in result.levels] == ["line"]
-    assert {one.message for one in result.findings} == {"rms: it is out of order"}
 
 
 # Findings.
@@ -239,6 +213,8 @@ def test_a_silent_record_has_a_page(tmp_path):
         ("[recording]\nrate_hz = 2000.0", 'reference = ["t.csv"]\nedge = ["x.csv"]', "recording.channel"),
         ("[recording]\ntime_column = 1", 'reference = ["t.csv"]\nedge = ["x.csv"]', "recording.time_unit"),
         ("[recording]\nrate_hz = 2000.0", 'reference = ["v.csv"]\nedge = ["x.csv"]', "sensor.unit"),
+        ('[chain]\nuse = ["line", "rms"]', 'reference = ["w.csv"]\nedge = ["x.csv"]', "chain.use.1"),
+        ("[chain]\nq = 30.0", 'reference = ["w.csv"]\nedge = ["x.csv"]', "chain.q"),
         ("[chain]\nband_hz = [200.0, 100.0]", 'reference = ["w.csv"]\nedge = ["x.csv"]', "chain.band_hz"),
     ],
 )

@@ -20,7 +20,7 @@ from unitcad.attenuation.edge.ranges import predictive_of, unit_key
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of
 from unitcad.files import sha256
-from unitcad.lab.fit_command import contents, fit_toml, leads_text, sections
+from unitcad.lab.fit_command import contents, fit_toml, leads_text, order, sections
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired_difference, shrunk
 from unitcad.spec import spec_hash, to_data
@@ -171,7 +171,7 @@ def thick(folder):
 def test_a_lab_where_thickness_matters_overturns_the_rule(tmp_path):
     """By the written rule: told apart from rule and baseline on the lab's own units, each left out."""
     result = fit_lab(load_fit_lab(thick(tmp_path)))
-    assert result.fit.leads == result.compared.order[0] == "published"
+    assert result.fit.leads == order(result)[0] == "published"
     assert "published leads: x " in leads_text(result)
     (tmp_path / "lab-fit.toml").write_text(fit_toml(result))
     common = {"materials.lossy": LOSSY, "layers.0.material": "lossy", "diameter_mm": 45.0}

@@ -58,7 +58,7 @@ def test_every_tested_share_has_the_modulus_of_the_source():
 def test_the_walls_and_the_response_are_those_of_another_program():
     made = _skin()
     assert made.expected.wall_mm == pytest.approx(63, abs=0.5)
-    assert made.inside_mm == 130
+    assert 2 * made.size.inner == 130
     assert made.size.tops[0] == 30.5
     assert made.expected.echo_pct < 5
     assert made.expected.factor == pytest.approx(2.4, abs=0.05)
@@ -116,16 +116,20 @@ def test_tools_and_layers_fill_the_box_without_overlap():
 def test_the_grams_are_the_volumes_and_the_thinner_the_recipe():
     made = _skin()
     pours = phantom_command.pours(made)
-    assert [pour.name for pour in pours] == ["muscle", "hypodermis", "skin"]
-    for pour in pours:
-        layer, one = made.table.layers[pour.layer], made.recipes[pour.layer]
-        assert pour.box_g == pytest.approx(made.volumes_mm3[pour.layer] * one.density_g_cm3 / 1e3)
-        assert pour.thinner_g / (pour.part_a_g + pour.part_b_g) == pytest.approx(layer.thinner_pct / 100)
-        assert pour.part_a_g + pour.part_b_g + pour.thinner_g == pytest.approx(1.1 * pour.box_g)
-        assert pour.grams_per_mm * layer.thickness_mm == pytest.approx(pour.box_g)
-    skin = pours[-1]
-    assert skin.off_grid
-    assert skin.frame_mm / skin.print_layer_mm == pytest.approx(8)
+    assert [pour.layer.name for pour in pours] == ["muscle", "hypodermis", "skin"]
+    for pour, volume in zip(pours, reversed(made.volumes_mm3), strict=True):
+        box = volume * pour.recipe.density_g_cm3 / 1e3
+        assert pour.thinner_g / (pour.part_a_g + pour.part_b_g) == pytest.approx(pour.layer.thinner_pct / 100)
+        assert pour.part_a_g == pytest.approx(pour.part_b_g)
+        assert pour.part_a_g + pour.part_b_g + pour.thinner_g == pytest.approx(1.1 * box)
+        assert pour.grams_per_mm * pour.layer.thickness_mm == pytest.approx(box)
+
+
+def test_a_frame_off_the_printer_s_layers_is_named_with_layers_that_fit():
+    """The skin's 1.5 mm are 7.5 layers of 0.2 mm, or 8 of 0.1875 mm; the others are whole."""
+    text = phantom_command.casting_markdown(_skin())
+    assert text.count("no whole number of") == 1
+    assert "frame of the skin in layers of 0.1875 mm: 1.5 mm" in text
 
 
 def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
@@ -136,20 +140,13 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
     assert found["findings"] == []
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     pieces = {f"moulds/{n}.stl" for n in ("tray", "frame2", "frame3", "lid", "blade")}
-    pages = {
-        "casting.md",
-        "casting.json",
-        "bom.csv",
-        "sheet.md",
-        "tissue.toml",
-        "response.json",
-        "response.svg",
-        "section.svg",
-    }
+    pages = {"casting.md", "tissue.toml", "response.json", "section.svg"}
     assert names == pieces | pages | {"moulds/moulds.3mf"}
     casting = (folder / "casting.md").read_text("utf-8")
     assert "repeatable, not skin-like" in casting
-    assert "0.1875 mm" in casting
+    assert json.loads((folder / "response.json").read_text("utf-8"))["value"] == pytest.approx(
+        found["response"]["value"], abs=1e-5
+    )
     tissue = tomllib.loads((folder / "tissue.toml").read_text("utf-8"))["tissue"]
     spec = load("embedded", {"tissue": tissue, "estimate.tissue": "phantom-skin"})
     layered = estimate_spec(spec, ["divider"])["layered"]
@@ -171,7 +168,7 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
         ({"layers": [LAYERS[0], LAYERS[0]]}, "layers", "name of its own"),
         ({"layers": [{**LAYERS[0], "thickness_mm": 0.1}]}, "layers.0.thickness_mm", "0.5"),
         ({"most_echo_pct": 0.1}, "most_echo_pct", "0.5"),
-        ({"coupons": 3}, "coupons", "unknown key"),
+        ({"room_c": 23.0}, "room_c", "unknown key"),
         (
             {"name": "Our Phantom"},
             "name",
@@ -207,21 +204,25 @@ def test_a_frame_is_exact():
 
 def test_the_bill_has_what_the_procedure_asks_for():
     text = phantom_command.casting_markdown(_skin()).split("## Buy and have ready")[0].lower()
-    items = " ".join(f"{one.item} {one.note}" for one in phantom_command.bill(_skin())).lower()
+    bill = {item: note for item, _, note in phantom_command.bill(_skin())}
+    items = " ".join(f"{item} {note}" for item, note in bill.items()).lower()
     for asked in ("tape", "clips", "pen", "emery paper", "primer", "degas", "talc", "calliper", "blade"):
         assert asked in text or asked == "calliper", asked
         assert asked in items, asked
-    (primer,) = [one for one in phantom_command.bill(_skin()) if one.item == "silicone primer"]
-    assert primer.note.startswith("optional")
+    assert bill["silicone primer"].startswith("optional")
+    quantities = {item: quantity for item, quantity, _ in phantom_command.bill(_skin())}
+    assert quantities["ecoflex-00-10"] == "167.4 g of A, 167.4 g of B"
 
 
-def test_the_sheet_wants_the_first_layer_s_height_of_the_tray_and_the_others_of_frames():
-    lines = phantom_command.sheet_markdown(_skin()).splitlines()
-    frames = next(line for line in lines if line.startswith("Frame heights"))
-    assert "muscle" not in frames
-    assert "hypodermis (4)" in frames
-    assert "skin (1.5)" in frames
-    assert "muscle (25)" in next(line for line in lines if line.startswith("Tray, rim above the plate"))
+def test_the_first_layer_is_struck_off_at_the_tray_and_the_others_at_frames():
+    """The bench sheet has an empty row for each pour."""
+    pours, sheet = (
+        phantom_command.casting_markdown(_skin()).split(f"## {title}")[1].split("\n## ")[0]
+        for title in ("Pours", "Bench sheet")
+    )
+    rows = [line.split(" | ")[1:3] for line in pours.splitlines() if line.startswith("| ")][2:]
+    assert rows == [["muscle", "the tray's rim, 25 mm"], ["hypodermis", "frame 2, 4 mm"], ["skin", "frame 3, 1.5 mm"]]
+    assert [line for line in sheet.splitlines() if "|  |" in line] == [f"| {i}{' | ' * 10} |" for i in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("diameter", [4.0, 40.0])

@@ -10,18 +10,19 @@ from msgspec import Meta
 
 from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal
-from unitcad.files import sha256
-from unitcad.lab.chains import ChainTable, chains_of
+from unitcad.files import path_seen_from, sha256
 from unitcad.lab.readers import Quantity, expect_ending, to_si
-from unitcad.lab.unit_files import File, Name, file_of
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
 from unitcad.validation.load import load_file
 
+Name = Annotated[str, Meta(min_length=1, max_length=100)]
+File = Annotated[str, Meta(min_length=1, max_length=1000)]
 Records = Annotated[tuple[File, ...], Meta(max_length=1000)]
 Positive = Annotated[float, between(1e-12, 1e12)]
 Column = Annotated[int, between(1, 4096)] | Name
 Rate = Annotated[float, between(1, 1e10)]
+Hertz = Annotated[float, between(1, 500)]
 TimeUnit = Literal["s", "ms", "us", "ns"]
 Delimiter = Literal[",", ";", "\t", " "]
 DecimalSign = Literal[".", ","]
@@ -50,6 +51,20 @@ class RecordingTable(Table, frozen=True, kw_only=True):
     )
     decimal: Annotated[DecimalSign | None, Meta(description="decimal sign; default: found in the file")] = None
     skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning of a file")] = None
+
+
+class ChainTable(Table, frozen=True, kw_only=True):
+    """The signal chains, the mains, and the band of the motor."""
+
+    use: Annotated[
+        tuple[Literal["line", "bandpass"], ...],
+        Meta(min_length=1, description="signal chains; the first one's levels are the result"),
+    ] = ("line",)
+    mains_hz: Annotated[float, between(40, 400, "frequency of the mains")] = 50.0
+    band_hz: Annotated[tuple[Hertz, Hertz], Meta(description="band in which the motor's line is searched")] = (
+        60.0,
+        250.0,
+    )
 
 
 class PointTable(Table, frozen=True, kw_only=True):
@@ -90,7 +105,8 @@ def _campaign_of(data: dict[str, Any]) -> Campaign:
     band, motor_channel = campaign.chain.band_hz, campaign.recording.motor_channel
     if band[0] >= band[1]:
         raise Refusal("chain.band_hz", list(band), "must rise", [60.0, 250.0])
-    chains_of(campaign.chain)
+    if len(set(use := campaign.chain.use)) < len(use):
+        raise Refusal("chain.use", list(use), "has a chain twice", list(dict.fromkeys(use)))
     for key, sensor in (("sensor", campaign.sensor), ("motor_sensor", campaign.motor_sensor)):
         if sensor is not None:
             to_si(sensor.unit, sensor.quantity, f"{key}.unit")
@@ -109,6 +125,14 @@ def _campaign_of(data: dict[str, Any]) -> Campaign:
             limit = both if unit.reference else "is required, or recording.motor_channel"
             raise Refusal(f"{field}.reference", list(unit.reference) or None, limit)
     return campaign
+
+
+def file_of(folder: Path, name: str, field: str) -> Path:
+    """Return the path of a file that a lab's file in `folder` names. Raises Refusal if there is none."""
+    path = folder / name
+    if not path.is_file():
+        raise Refusal(field, name, f"no such file in {path_seen_from(folder)}")
+    return path
 
 
 def check_files(campaign: Campaign, folder: Path) -> None:

@@ -46,11 +46,8 @@ def fit_toml(result: Fitted) -> str:
 
 def as_data(result: Fitted) -> dict[str, Any]:
     """Return everything as JSON-ready data."""
-    settings = result.lab.settings
     return {
-        "name": settings.name,
-        "note": settings.note,
-        "moduli": settings.moduli,
+        "note": result.lab.settings.note,
         "units": unit_rows(result),
         "models_differ_on": differing_units(result),
         "fit": without_none(msgspec.to_builtins(result.fit)),
@@ -61,9 +58,8 @@ def as_data(result: Fitted) -> dict[str, Any]:
 
 def unit_rows(result: Fitted) -> list[dict[str, Any]]:
     """Return each unit's measured level and the leading model's prediction without it."""
-    chosen = result.compared
-    name = chosen.leads
-    judged, table = chosen.judged[name], chosen.campaigns.table
+    name, table = result.fit.leads, result.campaigns.table
+    judged = result.judged[name]
     rows = []
     for i, unit in enumerate(table.names):
         low, high = map(float, quantiles(judged.df, judged.centre[i], judged.scale[i]))
@@ -78,7 +74,7 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
 
     The unit on which the models differ most comes first.
     """
-    judged = {name: one for name, one in result.compared.judged.items() if name != BASELINE}
+    judged = {name: one for name, one in result.judged.items() if name != BASELINE}
     own = next(iter(judged.values())).own
     rows = []
     for i, unit in zip(np.flatnonzero(own), result.lab.units, strict=True):
@@ -90,8 +86,8 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
 
 def prior_text(result: Fitted) -> str:
     """State the weight of the stored constants."""
-    settings, chosen = result.lab.settings, result.compared
-    count = int(np.sum(~chosen.campaigns.own))
+    settings = result.lab.settings
+    count = int(np.sum(~result.campaigns.own))
     if not count:
         return "Only the lab's own units count: nothing is shrunk."
     weight = count / (count * settings.between_labs**2 + 1)
@@ -130,7 +126,7 @@ def against_text(one: ModelFit) -> str:
 
 def leads_text(result: Fitted) -> str:
     """Say which model leads, by which rule, and the test that decided."""
-    judged = result.compared.judged
+    judged = result.judged
     errors = {name: np.abs(one.errors[one.own]) for name, one in judged.items()}
     lead = result.fit.leads
     tests = [
@@ -145,11 +141,20 @@ def leads_text(result: Fitted) -> str:
     )
 
 
+def order(result: Fitted) -> list[str]:
+    """Return the model that leads, then the others by their score; those with a constant not determined last."""
+
+    def place(name: str) -> tuple[bool, bool, float]:
+        return name != result.fit.leads, bool(result.fit.model[name].at_bound), round(result.judged[name].score, 4)
+
+    return sorted(result.judged, key=place)
+
+
 def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
-    """Return title, table with its head, and remarks of each section, for the page and the terminal."""
-    chosen = result.compared
+    """Return title, table with its head, and remarks of each section, for the terminal."""
+    names = order(result)
     models = [["model", "leave-one-out", "own units", "own, stored constants", "against the baseline", "coverage"]]
-    for name in chosen.order:
+    for name in names:
         one = result.fit.model[name]
         own = ["-" if value is None else f"{value:.2f}" for value in (one.own_leave_one_out, one.own_by_stored)]
         score = f"{one.leave_one_out:.2f} ({one.leave_one_out_low:.2f} to {one.leave_one_out_high:.2f})"
@@ -162,7 +167,7 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
     differing = [["unit", *rows[0]["levels"], "factor"]]
     for row in rows:
         differing.append([row["unit"], *(f"{level:.2g}" for level in row["levels"].values()), f"x {row['factor']:.2f}"])
-    constants = [f"{name}: {constants_text(result.fit.model[name])}." for name in chosen.order]
+    constants = [f"{name}: {constants_text(result.fit.model[name])}." for name in names]
     return [
         (
             "Models",
@@ -179,7 +184,7 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
                 "80 % range, which was predicted without them.",
             ],
         ),
-        ("Units", units, [f"Predicted without the unit by {chosen.leads}; 80 % intervals."]),
+        ("Units", units, [f"Predicted without the unit by {result.fit.leads}; 80 % intervals."]),
         ("Units on which the models differ most", differing, [DIFFERING]),
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,18 +15,21 @@ from scipy.special import stdtrit
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, coordinates_of, measured_table, nominal
-from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, SEED, Model, leader
+from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, SEED, bootstrap_range, leader
 from unitcad.attenuation.edge.ranges import InputFile, LabFit, ModelFit, OwnLevel, unit_key
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
+from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.estimate_inputs import estimate_input
+from unitcad.lab.campaign import File, Name, file_of
 from unitcad.lab.shrunk_fit import BETWEEN_LABS, Campaigns, Judged, Shrunk, gradients, judge, paired_difference, shrunk
-from unitcad.lab.unit_files import File, Name, UnitSource, file_of, measured_walls, source_file, specs_of
-from unitcad.spec import Spec, convert, read_toml, to_data
+from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
 from unitcad.spec.raw import Table
-from unitcad.validation import from_data
-from unitcad.validation.load import load_file
+from unitcad.text import some
+from unitcad.validation import custom_templates, from_data, put, read, templates
+from unitcad.validation.load import is_path, load_file
 
 LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
 _TWO_SIDED = 1.96
@@ -40,9 +44,16 @@ class LevelTable(Table, frozen=True, kw_only=True):
     high: Annotated[LevelValue | None, Meta(description="upper end of the 95 % interval")] = None
 
 
-class FitUnitTable(UnitSource, frozen=True, kw_only=True):
+class FitUnitTable(Table, frozen=True, kw_only=True):
     """One measured unit: its spec or cast record, and its level or the file with the level."""
 
+    name: Annotated[Name, Meta(description="a name of the unit")]
+    spec: Annotated[File | None, Meta(description="spec file or template of the unit")] = None
+    cast: Annotated[File | None, Meta(description="cast record of the unit, in place of spec")] = None
+    cavity: Annotated[
+        Annotated[int, Meta(ge=1, le=999)] | None,
+        Meta(description="cavity of the cast record: the number engraved next to the unit"),
+    ] = None
     set: Annotated[dict[str, Any], Meta(description="values of the spec to change, by path")] = field(
         default_factory=dict
     )
@@ -124,10 +135,7 @@ def _lab_of(data: dict[str, Any], path: Path) -> FitLab:
 def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, Any], inputs: dict[str, str]) -> OwnUnit:
     if (table.level is None) == (table.measured is None):
         raise Refusal(f"{where}.level", None, "is required, or measured; not both")
-    if table.spec is None and table.cast is None:
-        raise Refusal(f"{where}.spec", None, "is required, or cast")
-    source = source_file(table, folder, where)
-    asked, built = specs_of(table, folder, where, table.set, entries)
+    asked, built, source = _specs(where, table, folder, entries)
     if source:
         inputs[source] = files.sha256(folder / source)
     level, hertz, said, field = table.level, table.frequency_hz, "as typed", f"{where}.level"
@@ -143,8 +151,93 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
         raise Refusal(f"{field}.{missing}", None, "is required together with the other end")
     if level.low is not None and level.high is not None and not level.low <= level.value <= level.high:
         raise Refusal(f"{field}.value", level.value, f"must be from low {level.low:g} to high {level.high:g}")
-    walls = measured_walls(asked, built)
-    return OwnUnit(table.name, asked, built, hertz, level, f"{said}, {walls}" if walls else said)
+    if asked.layers != built.layers:
+        said += f", walls as measured, {', '.join(f'{layer.wall_mm:.3g}' for layer in built.layers)} mm"
+    return OwnUnit(table.name, asked, built, hertz, level, said)
+
+
+def _specs(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, Any]) -> tuple[Spec, Spec, str | None]:
+    """Return a unit's spec as asked, the spec as built, and the file that defines it, None for a template.
+
+    The spec as built has the walls that the cast record measured, the mean of their places.
+    """
+    if table.spec is not None and table.cast is not None:
+        raise Refusal(f"{where}.cast", table.cast, "excludes spec; leave one out")
+    if table.cavity is not None and table.cast is None:
+        raise Refusal(f"{where}.cavity", table.cavity, "is of a cast record, but there is no cast")
+    if table.cast is not None:
+        if table.set:
+            raise Refusal(f"{where}.set", dict(table.set), "excludes cast: the record has the spec that was cast")
+        return *_cast_specs(where, table, table.cast, folder, entries), table.cast
+    if table.spec is None:
+        raise Refusal(f"{where}.spec", None, "is required, or cast")
+    known, own = templates() | custom_templates(), is_path(table.spec)
+    if own:
+        file_of(folder, table.spec, f"{where}.spec")
+    elif table.spec not in known:
+        raise unknown_name(f"{where}.spec", table.spec, known)
+    data = read(folder / table.spec if own else table.spec)
+    check_plain(data)
+    for path, entry in entries.items():
+        put(data, path, entry)
+    try:
+        for path, value in table.set.items():
+            put(data, path, value)
+        spec = from_data(data, folder)
+    except Refusal as refusal:
+        raise type(refusal)(f"{where}.{refusal.field}", refusal.value, refusal.limit, refusal.nearest) from None
+    return spec, spec, table.spec if own else None
+
+
+def _cast_specs(
+    where: str, table: FitUnitTable, name: str, folder: Path, entries: Mapping[str, Any]
+) -> tuple[Spec, Spec]:
+    """Return the spec of a cast record, and the same with the measured walls of the unit that is meant."""
+    field = f"{where}.cast"
+    path = file_of(folder, name, field)
+    try:
+        record = read_cast_record(path)
+    except UnitcadError as error:
+        raise Refusal(field, name, str(error)) from None
+    unit = _cavity(f"{where}.cavity", record, table.cavity, name)
+    if record.spec is None:
+        raise Refusal(field, name, "spec: is required here: the resolved spec as a table")
+    data = copy.deepcopy(record.spec)
+    try:
+        for key, entry in entries.items():
+            put(data, key, entry)
+        asked = from_data(data)
+        count, known = len(asked.layers), materials(asked.materials)
+        for wall in unit.walls if unit else ():
+            if wall.layer > count:
+                raise Refusal("units.walls.layer", wall.layer, f"the spec has {count} layers", count)
+            put(data, f"layers.{wall.layer - 1}.wall_mm", float(np.mean(wall.places_mm)))
+        for i, pour in enumerate(record.pours):
+            own = asked.layers[pour.index - 1].material if pour.index <= count else pour.material
+            if pour.material in known and pour.material != own:
+                limit = f"the record's own spec has {own} in layer {pour.index}"
+                raise Refusal(f"pours.{i}.material", pour.material, limit)
+        return asked, from_data(data)
+    except Refusal as refusal:
+        raise Refusal(field, name, str(refusal)) from None
+
+
+def _cavity(field: str, record: CastRecord, cavity: int | None, name: str) -> CastUnit | None:
+    """Return the unit of a cast record that is meant; None if nobody looked at any."""
+    units = {one.cavity: one for one in record.units}
+    usable = [one for one in record.units if one.usable]
+    nearest = min((one.cavity for one in usable), key=lambda other: abs(other - (cavity or 0)), default=None)
+    if cavity is not None:
+        unit = units.get(cavity)
+        if unit is None and units:
+            raise Refusal(field, cavity, f"{name} has no such unit; it has {some(units)}", nearest)
+    elif len(units) > 1 and len(usable) != 1:
+        raise Refusal(field, None, f"is required: {name} has the cavities {some(units)}")
+    else:
+        unit = next(iter([*usable, *record.units]), None)
+    if unit is not None and not unit.usable:
+        raise Refusal(field, unit.cavity, f"{name} says that this unit is not usable", nearest)
+    return unit
 
 
 def _measured(where: str, table: FitUnitTable, path: Path) -> tuple[LevelTable, float, str]:
@@ -173,54 +266,12 @@ _SIDES = 0.95
 
 
 @dataclass(frozen=True)
-class Compared:
-    """All models: the units, judged, fitted for the lab."""
-
-    campaigns: Campaigns
-    judged: dict[str, Judged]
-    fitted: dict[str, Shrunk]
-
-    @property
-    def leads(self) -> str:
-        """The model that leads: `models.leader` over the lab's own units."""
-        return leader(
-            {
-                name: np.abs(one.errors[one.own])
-                for name, one in self.judged.items()
-                if name == RULE or not self.at_bound(name)
-            }
-        )
-
-    @property
-    def order(self) -> list[str]:
-        """The model that leads, then the others by their score; those with a constant not determined last."""
-
-        def place(name: str) -> tuple[bool, bool, float]:
-            return name != self.leads, self.at_bound(name) is not None, round(self.judged[name].score, 4)
-
-        return sorted(self.judged, key=place)
-
-    def at_bound(self, name: str) -> str | None:
-        """Return a constant that the units do not determine, None if they determine all.
-
-        None of the units reads it, all read it alike with another constant, or the search met its bound.
-        """
-        constants = self.fitted[name].constants
-        if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
-            return "kappa"
-        read = gradients(COMPARED[name], self.campaigns.table, constants)
-        unread = ~read.any(axis=0)
-        if name == BASELINE or (not unread.any() and np.linalg.matrix_rank(read) == read.shape[1]):
-            return None
-        return COMPARED[name].names[int(np.argmax(unread)) if unread.any() else -1]
-
-
-@dataclass(frozen=True)
 class Fitted:
-    """The study of a lab, and the fit for an estimate."""
+    """The study of a lab: all units, each model judged on them, and the fit for an estimate."""
 
     lab: FitLab
-    compared: Compared
+    campaigns: Campaigns
+    judged: dict[str, Judged]
     fit: LabFit
 
 
@@ -231,7 +282,11 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
         limit = f"{len(lab.units)} units; without the paper's {LEAST_ALONE} are needed"
         raise Refusal("unit", None, limit)
     say("models")
-    inputs = [_input(unit, settings.moduli) for unit in lab.units]
+    inputs = []
+    for unit in lab.units:
+        data = to_data(unit.built)
+        data["estimate"]["moduli"] = settings.moduli
+        inputs.append(estimate_input(from_data(data), unit.frequency_hz))
     for i, one in enumerate(inputs):
         for at, layer in enumerate(one.layers):
             if not layer.youngs_modulus.known:
@@ -239,9 +294,11 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
                 raise Refusal("moduli", settings.moduli, limit)
     campaigns = campaigns_of(lab, inputs)
     judged = {name: judge(model, campaigns) for name, model in COMPARED.items()}
-    compared = Compared(campaigns, judged, {name: shrunk(model, campaigns) for name, model in COMPARED.items()})
-    leads, measured = compared.leads, []
-    model, constants = COMPARED[leads], compared.fitted[leads].constants
+    fitted = {name: shrunk(model, campaigns) for name, model in COMPARED.items()}
+    bounds = {name: _at_bound(name, campaigns, one.constants) for name, one in fitted.items()}
+    errors = {name: np.abs(one.errors[one.own]) for name, one in judged.items()}
+    leads = leader({name: one for name, one in errors.items() if name == RULE or not bounds[name]})
+    model, constants, measured = COMPARED[leads], fitted[leads].constants, []
     for unit, built in zip(lab.units, inputs, strict=True):
         variant, level = estimate_input(unit.spec, unit.frequency_hz), unit.level
         predicted = float(model.logs(nominal(built), constants)[0])
@@ -257,10 +314,24 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
         format=1, name=settings.name, units=len(lab.units), moduli=settings.moduli,
         include_paper_units=settings.include_paper_units,
         between_labs=settings.between_labs, seed=SEED, leads=leads,  # pyright: ignore[reportArgumentType]
-        model={name: _entry(one, name, compared) for name, one in COMPARED.items()},
+        model={name: _entry(name, campaigns, judged, one, bounds[name]) for name, one in fitted.items()},
         measured=measured, input=list(lab.inputs),
     )  # fmt: skip
-    return Fitted(lab, compared, fit)
+    return Fitted(lab, campaigns, judged, fit)
+
+
+def _at_bound(name: str, campaigns: Campaigns, constants: np.ndarray) -> str | None:
+    """Return a constant of a model that the units do not determine, None if they determine all.
+
+    None of the units reads it, all read it alike with another constant, or the search met its bound.
+    """
+    if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
+        return "kappa"
+    read = gradients(COMPARED[name], campaigns.table, constants)
+    unread = ~read.any(axis=0)
+    if name == BASELINE or (not unread.any() and np.linalg.matrix_rank(read) == read.shape[1]):
+        return None
+    return COMPARED[name].names[int(np.argmax(unread)) if unread.any() else -1]
 
 
 def campaigns_of(lab: FitLab, inputs: list[EstimateInput]) -> Campaigns:
@@ -279,23 +350,17 @@ def campaigns_of(lab: FitLab, inputs: list[EstimateInput]) -> Campaigns:
     return Campaigns(table, own, error, lab.settings.between_labs)
 
 
-def _input(unit: OwnUnit, moduli: str) -> EstimateInput:
-    """Return the input of a unit as built, by a source of moduli."""
-    data = to_data(unit.built)
-    data["estimate"]["moduli"] = moduli
-    return estimate_input(from_data(data), unit.frequency_hz)
-
-
-def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
-
-    judged, found, campaigns = compared.judged[name], compared.fitted[name], compared.campaigns
+def _entry(
+    name: str, campaigns: Campaigns, all_judged: Mapping[str, Judged], found: Shrunk, at_bound: str | None
+) -> ModelFit:
+    model, judged = COMPARED[name], all_judged[name]
     spread = stdtrit(found.df, _SIDES) * found.sigma * np.sqrt(np.diag(found.covariance))
     wide = np.exp(np.minimum(spread, _WIDEST))
     paper = ~campaigns.own
     constants = {"constants": found.constants, "low": found.constants / wide, "high": found.constants * wide}
     constants["stored"] = model.fit(campaigns.table, paper[None].astype(float))[0] if paper.any() else ()
-    low, high = judged.range
-    against, error, p = paired_difference(judged, compared.judged[BASELINE]) if name != BASELINE else (None, None, None)
+    low, high = bootstrap_range(np.abs(judged.errors))
+    against, error, p = paired_difference(judged, all_judged[BASELINE]) if name != BASELINE else (None, None, None)
     numbers = {
         **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
         "model_error": found.sigma, "covariance": found.covariance.tolist(), "leave_one_out": judged.score,
@@ -306,6 +371,6 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     return ModelFit(
         degrees_of_freedom=found.df,
         coverage=f"{judged.coverage} of {judged.errors.size}",
-        at_bound=compared.at_bound(name),
+        at_bound=at_bound,
         **rounded(numbers, 6),
     )

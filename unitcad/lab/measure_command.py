@@ -19,7 +19,7 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
 from unitcad.export.chart import Series, chart
-from unitcad.lab import measuring
+from unitcad.lab import bandpass, measuring
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measuring import Measured
 from unitcad.lab.record import RecordResult
@@ -66,9 +66,8 @@ def measured_table(result: Measured) -> dict[str, Any]:
         {"unit": unit, "place": record.role, "file": record.file, "sha256": record.sha256, "usable": record.usable}
         for unit, record in _each_record(result)
     ]
-    assumed = {"assumed": result.assumed} if result.assumed else {}
     return {
-        "name": campaign.name, "status": "measured", "chain": campaign.chain.use[0], "interval": 0.95, **assumed,
+        "name": campaign.name, "status": "measured", "chain": campaign.chain.use[0], "interval": 0.95,
         "level": rounded(levels, 6), "record": records,
     }  # fmt: skip
 
@@ -80,7 +79,6 @@ def as_data(result: Measured) -> dict[str, Any]:
         "levels": measured_table(result)["level"],
         "records": [{"unit": unit, **record.as_dict()} for unit, record in _each_record(result)],
         "findings": [finding.as_dict() for finding in result.findings],
-        "assumed": result.assumed,
     }
 
 
@@ -92,8 +90,8 @@ def lines(result: Measured) -> Iterator[str]:
             f"{one.unit}, {_place(one.distance_mm)}, {one.chain}: {value} of the motor's amplitude, "
             f"{one.frequency_hz:.1f} Hz"
         )
-    for text in _assumed(result):
-        yield f"  {text}"
+    if assumed := _assumed(result):
+        yield f"  {assumed}"
 
 
 _STYLE = """:root{color-scheme:light dark;--text:#222;--back:#fff;--edge:#ccc;--error:#a11;--warning:#850}
@@ -121,36 +119,35 @@ def page(result: Measured) -> str:
         level = one.level
         size = f"{level.value:.3f}", f"{level.low:.3f} to {level.high:.3f}", " + ".join(map(str, level.repeats))
         levels.append((one.unit, _place(one.distance_mm), one.chain, *size, f"{one.frequency_hz:.2f}"))
-    gains = [chain.name for chain in result.chains if chain.gain]
+    assumed = _assumed(result)
     records = []
     for unit, r in _each_record(result):
         row = [unit, r.role, r.file, "yes" if r.usable else "no"]
         row += [
             f"{r.amplitude_um:.4g}", f"{2 * r.u_um:.2g}" if r.usable else "", f"{r.frequency_hz:.2f}",
             f"{r.steady_s:.3g} of {r.length_s:.3g}", f"{r.drift:.2%}", f"{r.snr:.3g}",
-            *(f"{r.gains[name]:.3f}" for name in gains),
-        ] if r.frequency_hz else [""] * (6 + len(gains))  # fmt: skip
+            "" if r.bandpass_gain is None else f"{r.bandpass_gain:.3f}",
+        ] if r.frequency_hz else [""] * 7  # fmt: skip
         records.append((*row, r.sha256[:12]))
     head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
+    head = (*head, "gain of bandpass", "SHA-256")
     return _document(
         result.campaign.name,
         f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
         + (_table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels) if levels else _NO_LEVEL)
-        + "".join(f"<p>{escape(text)}.</p>" for text in _assumed(result))
+        + (f"<p>{escape(assumed)}.</p>" if assumed else "")
         + f"{_figures(_decay_charts(result))}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
         "<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
-        "comes from the scatter of the repeats.</p>"
-        + _table((*head, *(f"gain of {name}" for name in gains), "SHA-256"), records)
-        + f"<h2>Charts of the records</h2>{drawn}",
+        "comes from the scatter of the repeats.</p>" + _table(head, records) + f"<h2>Charts of the records</h2>{drawn}",
     )
 
 
 _NO_LEVEL = "<p>None: see the findings.</p>"
 
 
-def _assumed(result: Measured) -> list[str]:
-    """State the assumptions of the chains that have some."""
-    return [f"Chain {chain.name}, assumed: {chain.assumed_text}" for chain in result.chains if chain.assumed]
+def _assumed(result: Measured) -> str:
+    """State the values that the chain bandpass assumes, if it was used."""
+    return f"Chain bandpass, assumed: {bandpass.ASSUMED}" if "bandpass" in result.campaign.chain.use else ""
 
 
 def _document(name: str, body: str) -> str:
@@ -209,7 +206,7 @@ def _record_charts(record: RecordResult) -> list[str]:
 def _decay_charts(result: Measured) -> Iterator[str]:
     """Chart each unit's levels of the first chain over the distance, as SVG."""
     for unit in result.campaign.unit:
-        levels = [one for one in result.levels if (one.unit, one.chain) == (unit.name, result.chains[0].name)]
+        levels = [one for one in result.levels if (one.unit, one.chain) == (unit.name, result.campaign.chain.use[0])]
         if levels:
             x = [one.distance_mm for one in levels]
             bars = [(one.level.low, one.level.high) for one in levels]

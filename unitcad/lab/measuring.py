@@ -12,19 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.stats import t
 
 from unitcad.errors import Refusal
-from unitcad.lab.campaign import (
-    Campaign,
-    SensorTable,
-    UnitTable,
-    check_files,
-)
-from unitcad.lab.chains import Chain, chains_of
+from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, check_files
 from unitcad.lab.record import LabFinding, RecordResult, finding, measure_record
 
 COVERAGE = 0.95
@@ -98,16 +91,6 @@ class Measured:
     records: dict[str, tuple[RecordResult, ...]]
     findings: tuple[LabFinding, ...]
 
-    @property
-    def chains(self) -> tuple[Chain, ...]:
-        """The chains of the campaign."""
-        return chains_of(self.campaign.chain)
-
-    @property
-    def assumed(self) -> dict[str, Any]:
-        """The parameters of the chains that their sources do not state; none if no such chain was used."""
-        return {name: value for chain in self.chains for name, value in chain.assumed.items()}
-
 
 def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambda name: None) -> Measured:
     """Measure a campaign with files in or below `folder`; `say` gets each record.
@@ -126,12 +109,6 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
             levels += more
             findings += said
     return Measured(campaign, tuple(levels), records, tuple(findings))
-
-
-def _sensors(campaign: Campaign) -> tuple[SensorTable, ...]:
-    """Return the sensors of a record's channels: the unit's, and the motor's if it was recorded at the same time."""
-    motor = campaign.motor_sensor or campaign.sensor
-    return (campaign.sensor, motor) if campaign.recording.motor_channel is not None else (campaign.sensor,)
 
 
 def _places(unit: UnitTable) -> list[tuple[str, float, tuple[str, ...]]]:
@@ -161,7 +138,7 @@ def _records(
     if hertz:
         middle = float(np.median(hertz))
         band = (max(band[0], middle * (1 - NEAR_MOTOR)), min(band[1], middle * (1 + NEAR_MOTOR)))
-    sensors = _sensors(campaign)
+    sensors = (campaign.sensor,) if campaign.recording.motor_channel is None else (campaign.sensor, motor)
     for role, _, names in _places(unit):
         for name in names:
             add(name, role, sensors, band)
@@ -187,20 +164,18 @@ def _levels(
     hertz = float(np.median([one.frequency_hz for one in near]))
     levels: list[PlaceLevel] = []
     findings: list[LabFinding] = []
-    for chain in chains_of(campaign.chain):
-        values, below = (
-            [one.by_chain[chain.name] for one in side if chain.name in one.by_chain] for side in (near, base)
-        )
+    for chain in campaign.chain.use:
+        values, below = ([one.by_chain[chain] for one in side if chain in one.by_chain] for side in (near, base))
         if not values:  # L114 or L106 says why
             continue
         count = min(len(values), len(below))
         if count < LEAST_REPEATS:
             message = f"{count} usable records; a level needs {LEAST_REPEATS}"
-            findings.append(finding("L112", f"{where}, {hertz:.2f} Hz, by {chain.name}", message))
+            findings.append(finding("L112", f"{where}, {hertz:.2f} Hz, by {chain}", message))
             continue
         result = level(values, None if paired else below)
-        levels.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
+        levels.append(PlaceLevel(unit.name, distance, chain, result, hertz))
         if result.scatter > MOST_DISAGREEMENT:
-            message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
+            message = f"by {chain}: logarithms scatter by {result.scatter:.2f}"
             findings.append(finding("L109", where, message))
     return levels, findings

@@ -7,7 +7,6 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from importlib import resources
 from itertools import pairwise
 from typing import Annotated, Any
@@ -16,7 +15,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.inputs import TissueLayer, tissue_medium
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
 from unitcad.catalogue import entries as kinds
@@ -44,7 +43,6 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     silicone: Annotated[str, Meta(description="tested silicone: ecoflex-00-10, ecoflex-00-30 or ecoflex-00-50")]
     thinner_pct: Annotated[float, between(0, 100, "thinner, in parts by weight to 100 of A and B")]
     thickness_mm: Annotated[float, between(LEAST_LAYER, 60, "thickness of the layer")]
-    loss_factor: Annotated[float, between(0.01, 1, "tan delta (assumed)")] = 0.2
 
 
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -59,15 +57,10 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         tuple[Annotated[float, between(0, 60)], ...],
         Meta(min_length=2, max_length=13, description="distances of the measuring points from the unit's edge"),
     ] = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-    most_echo_pct: Annotated[
-        float,
-        between(0.5, 50, "largest echo of the walls at the last point, percent"),
-    ] = 5.0
+    most_echo_pct: Annotated[float, between(0.5, 50, "largest echo of the walls at the last point, percent")] = 5.0
     plate_thickness_mm: Annotated[float, between(2, 20, "thickness of the acrylic plate below")] = 5.0
     printer: Annotated[str, Meta(description="printer of the catalogue")] = "fdm-0.4"
     waste: Annotated[float, between(0, 2, "extra mix, as a fraction")] = 0.1
-    scale_resolution_g: Annotated[float, between(1e-4, 10, "smallest step of the scale")] = 0.1
-    room_c: Annotated[float, between(5, 45, "temperature of the room")] = 23.0
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
@@ -75,27 +68,27 @@ def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
     return load_file(source, "phantom", lambda data, _: convert(data, PhantomTable))
 
 
+_TABLE = tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
+SOURCE = str(_TABLE["source"])
+"""Source of the moduli of silicones with thinner."""
 THINNER_DENSITY = 0.97
 """g/cm3 (assumed: a silicone oil)."""
-LOSS_RANGE = (0.5, 1.5)
-"""Range of an assumed loss factor, as factors: 0.1 to 0.3 for 0.2."""
+LOSS_FACTOR = (0.2, 0.1, 0.3)
+"""Tan delta of a silicone with thinner, and its range (assumed)."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """A silicone with thinner: Young's modulus kPa, tan delta and their ranges, density g/cm3.
+    """A silicone with thinner: Young's modulus kPa and its range, density g/cm3.
 
     The modulus is the table's, its range two standard deviations. `high_kpa` includes the stiffening at the frequency.
     """
 
     silicone: Material
-    thinner_pct: float
     modulus_kpa: float
     low_kpa: float
     high_kpa: float
     density_g_cm3: float
-    source: str
-    loss: tuple[float, float, float]
 
 
 def recipe(layer: PhantomLayer, frequency_hz: float, field: str) -> Recipe:
@@ -106,17 +99,8 @@ def recipe(layer: PhantomLayer, frequency_hz: float, field: str) -> Recipe:
     value, low, high = modulus_by_table(layer.silicone, layer.thinner_pct, field)
     material = materials()[layer.silicone]
     volume = 100.0 / float(material.density_g_cm3) + layer.thinner_pct / THINNER_DENSITY
-    least, most = LOSS_RANGE
-    return Recipe(
-        material,
-        layer.thinner_pct,
-        value,
-        low,
-        stiffening(frequency_hz) * high,
-        (100.0 + layer.thinner_pct) / volume,
-        str(_table()["source"]),
-        (layer.loss_factor, least * layer.loss_factor, most * layer.loss_factor),
-    )
+    density = (100.0 + layer.thinner_pct) / volume
+    return Recipe(material, value, low, stiffening(frequency_hz) * high, density)
 
 
 def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[float, float, float]:
@@ -125,7 +109,7 @@ def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[flo
     Between two tested shares the logarithm of the modulus is interpolated. Raises Refusal for a silicone that was not
     tested, and for a share outside the tested ones.
     """
-    known = {name: table for name, table in _table().items() if isinstance(table, dict)}
+    known = {name: table for name, table in _TABLE.items() if isinstance(table, dict)}
     if silicone not in known:
         raise unknown_name(f"{field}.silicone", silicone, known)
     shares, moduli, deviations = (
@@ -151,22 +135,9 @@ def stiffening(frequency_hz: float) -> float:
     return abs(law.complex_shear(1.0, 2.0 * math.pi * frequency_hz))
 
 
-@cache
-def _table() -> dict[str, Any]:
-    return tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
-
-
 POINT_RADIUS = 1.25
 LEAST_APART = 2 * POINT_RADIUS + 1.0
 """Between two points, mm: the holes of nearer ones would leave no wall."""
-
-
-def expect_apart(points_mm: Sequence[float]) -> None:
-    """Raise Refusal for points whose holes in the lid would meet."""
-    for one, other in pairwise(sorted(points_mm)):
-        if other - one < LEAST_APART:
-            limit = f"{one:g} and {other:g} are nearer than {LEAST_APART:g} mm: their holes in the lid would meet"
-            raise Refusal("points_mm", list(points_mm), limit)
 
 
 WALL, FLOOR, LID = 4.0, 3.0, 4.0
@@ -188,9 +159,10 @@ _PLATE, _BLADE = (0.8, 0.9, 0.95), (0.90, 0.30, 0.30)
 
 @dataclass(frozen=True)
 class BoxLengths:
-    """Lengths of a box, mm: half sides of the cavity at the plate and at the rim, of the walls, and the heights.
+    """Lengths of a box, mm: half sides of the cavity at the plate and at the rim and of the walls, and more.
 
-    `tops`: the height above the plate that each layer is struck off at, skin first.
+    `tops`: the height above the plate that each layer is struck off at, skin first; the last is the tray's rim.
+    `plate`: its thickness; `hole`: radius for a peg.
     """
 
     inner: float
@@ -199,37 +171,16 @@ class BoxLengths:
     tops: tuple[float, ...]
     plate: float
     hole: float
-    peg_x: float
-    ear_y: float
-
-    @property
-    def tray_rim(self) -> float:
-        """Height of the tray's rim: the lowest layer's."""
-        return self.tops[-1]
-
-    @property
-    def bottom(self) -> float:
-        """Height of the tray's foot, below the plate."""
-        return -self.plate - FLOOR
 
 
 def lengths(phantom: PhantomTable, inside_mm: float, printer: Printer) -> BoxLengths:
     """Return the box's lengths for a cavity of `inside_mm` at the plate."""
     thickness = [layer.thickness_mm for layer in phantom.layers]
     tops = tuple(sum(thickness[i:]) for i in range(len(thickness)))
-    rim = inside_mm / 2 + tops[-1] * math.tan(math.radians(DRAFT_DEG))
-    outer = rim + WALL
-    play = float(printer.plinth_clearance_mm) + 0.1
-    return BoxLengths(
-        inside_mm / 2,
-        rim,
-        outer,
-        tops,
-        phantom.plate_thickness_mm,
-        PEG_RADIUS + play,
-        outer + PEG_FROM_WALL,
-        EAR_AT * outer,
-    )
+    inner = inside_mm / 2
+    rim = inner + tops[-1] * math.tan(math.radians(DRAFT_DEG))
+    hole = PEG_RADIUS + float(printer.plinth_clearance_mm) + 0.1
+    return BoxLengths(inner, rim, rim + WALL, tops, phantom.plate_thickness_mm, hole)
 
 
 def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
@@ -252,7 +203,7 @@ def pieces(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
         shape = cut(_outline(size, low, high), [opening, *_peg_holes(size, low, high)])
         number = len(size.tops) - step
         frames.append(Body(f"frame{number}", "tool", "frame", shape, _COLOURS["frame"], step=number))
-    blade = moved(turned(bar(size.outer + PEG_FROM_WALL - PEG_RADIUS - 1.0, 0.0), "z", 1), 0, 0, size.tray_rim)
+    blade = moved(turned(bar(size.outer + PEG_FROM_WALL - PEG_RADIUS - 1.0, 0.0), "z", 1), 0, 0, size.tops[-1])
     plate = Extrude(_square(size.inner - PLATE_PLAY), -size.plate, 0.0)
     return [
         Body("tray", "tool", "base", _tray(size), _COLOURS["base"]),
@@ -271,26 +222,33 @@ def _at_corners(shape: Shape, x: float, y: float) -> list[Shape]:
     return [moved(shape, sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 1)]
 
 
+def _at_pegs(size: BoxLengths, shape: Shape) -> list[Shape]:
+    return _at_corners(shape, size.outer + PEG_FROM_WALL, EAR_AT * size.outer)
+
+
 def _tray(size: BoxLengths) -> Shape:
     # The taper runs on above the rim, so that no face of the tool is in the rim's plane.
     beyond = 1.0
-    wide = size.rim + beyond * (size.rim - size.inner) / size.tray_rim
-    cavity = Extrude(_square(size.inner), 0.0, size.tray_rim + beyond, top=_square(wide))
+    wide = size.rim + beyond * (size.rim - size.inner) / size.tops[-1]
+    cavity = Extrude(_square(size.inner), 0.0, size.tops[-1] + beyond, top=_square(wide))
     pocket = Extrude(_square(size.inner), -size.plate, 0.5)
-    hole = cylinder(PUSH_RADIUS, size.bottom - 1.0, -size.plate + 1.0)
+    bottom = -size.plate - FLOOR
+    hole = cylinder(PUSH_RADIUS, bottom - 1.0, -size.plate + 1.0)
     holes = _at_corners(hole, 0.6 * size.inner, 0.6 * size.inner)
-    pegs = _at_corners(cylinder(PEG_RADIUS, size.tray_rim - 1.0, size.tops[0] + LID), size.peg_x, size.ear_y)
-    return union((cut(_outline(size, size.bottom, size.tray_rim), [cavity, pocket, *holes]), *pegs))
+    pegs = _at_pegs(size, cylinder(PEG_RADIUS, size.tops[-1] - 1.0, size.tops[0] + LID))
+    return union((cut(_outline(size, bottom, size.tops[-1]), [cavity, pocket, *holes]), *pegs))
 
 
 def _outline(size: BoxLengths, low: float, high: float) -> Shape:
     half = EAR / 2 + 1.0
     ear = box(-half, half, -EAR_HALF, EAR_HALF, low, high)
-    return union((Extrude(_square(size.outer), low, high), *_at_corners(ear, size.outer + half - 2.0, size.ear_y)))
+    return union(
+        (Extrude(_square(size.outer), low, high), *_at_corners(ear, size.outer + half - 2.0, EAR_AT * size.outer))
+    )
 
 
 def _peg_holes(size: BoxLengths, low: float, high: float) -> list[Shape]:
-    return _at_corners(cylinder(size.hole, low - 1.0, high + 1.0), size.peg_x, size.ear_y)
+    return _at_pegs(size, cylinder(size.hole, low - 1.0, high + 1.0))
 
 
 def _lid(phantom: PhantomTable, size: BoxLengths) -> Shape:
@@ -317,8 +275,7 @@ class Expected:
 
     `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
     layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
-    `echo_pct`: at the actual wall. `forearm`: the template's
-    curve, `factor` the mean factor between the two.
+    `echo_pct`: at the actual wall. `forearm`: the template's curve, `factor` the mean factor between the two.
     """
 
     distances_mm: tuple[float, ...]
@@ -337,7 +294,7 @@ def medium(phantom: PhantomTable, recipes: Sequence[Recipe], **changed: Sequence
     usual = {
         "thickness": [layer.thickness_mm for layer in phantom.layers],
         "modulus": [one.modulus_kpa for one in recipes],
-        "loss": [one.loss[0] for one in recipes],
+        "loss": [LOSS_FACTOR[0]] * len(recipes),
     }
     layers = [
         Layer(thickness * 1e-3, one.density_g_cm3 * 1e3, modulus * 1e3, POISSON, LossFactor(loss))
@@ -375,13 +332,7 @@ def _curve(phantom: PhantomTable, stack: LayeredMedium, r_mm: np.ndarray) -> np.
     return u[1:] / u[0]
 
 
-def expected(
-    phantom: PhantomTable,
-    recipes: Sequence[Recipe],
-    wall_mm: float,
-    least_wall_mm: float,
-    forearm: tuple[TissueLayer, ...],
-) -> Expected:
+def expected(phantom: PhantomTable, recipes: Sequence[Recipe], wall_mm: float, least_wall_mm: float) -> Expected:
     """Work out the response at the phantom's points; `wall_mm` is the box's, `least_wall_mm` of `wall_distance`."""
     distances = np.array(sorted(phantom.points_mm))
     r = phantom.unit_diameter_mm / 2 + np.concatenate([[0.0], distances])
@@ -390,15 +341,14 @@ def expected(
         return _curve(phantom, medium(phantom, recipes, **changed), r)
 
     value = curve()
-    losses = [[one.loss[end] for one in recipes] for end in (1, 2)]
-    cases = [value, *(curve(loss=loss) for loss in losses)]
+    cases = [value, *(curve(loss=[loss] * len(recipes)) for loss in LOSS_FACTOR[1:])]
     cases += [curve(modulus=[one.low_kpa for one in recipes]), curve(modulus=[one.high_kpa for one in recipes])]
     sensitivity = {}
     for i, layer in enumerate(phantom.layers):
         thickness = [one.thickness_mm - (THINNER_MM if j == i else 0.0) for j, one in enumerate(phantom.layers)]
         cases.append(curve(thickness=thickness))
         sensitivity[layer.name] = round(float(cases[-1][-1] / value[-1] - 1), _DECIMALS)
-    arm, beyond = _curve(phantom, tissue_medium(forearm), r), distances > 0
+    arm, beyond = _curve(phantom, tissue_medium(tuple(map(tissue_layer, tissue()))), r), distances > 0
     factor = math.exp(float(np.mean(np.abs(np.log(value[beyond] / arm[beyond])))))
     value, low, high, arm = (tuple(one.tolist()) for one in (value, np.min(cases, 0), np.max(cases, 0), arm))
     echo = 100 * float(_echo(phantom, medium(phantom, recipes), np.array([wall_mm]))[0])
@@ -407,21 +357,15 @@ def expected(
 
 SEGMENTS = 96
 _STEP_MM = 5.0
-LONGEST_SOURCE = 500
-"""Characters of a source in a spec."""
 
 
 @dataclass(frozen=True)
 class PhantomSet:
-    """A phantom ready to be written.
-
-    `volumes_mm3`: of each layer, skin first.
-    """
+    """A phantom ready to be written; `volumes_mm3`: of each layer, skin first."""
 
     table: PhantomTable
     recipes: tuple[Recipe, ...]
     printer: Printer
-    inside_mm: float
     size: BoxLengths
     tools: tuple[Body, ...]
     layers: tuple[Body, ...]
@@ -437,7 +381,10 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     recipes = tuple(recipe(one, table.frequency_hz, f"layers.{i}") for i, one in enumerate(table.layers))
     if len({layer.name for layer in table.layers}) < len(table.layers):
         raise Refusal("layers", some(layer.name for layer in table.layers), "each layer needs a name of its own")
-    expect_apart(table.points_mm)
+    for one, other in pairwise(sorted(table.points_mm)):
+        if other - one < LEAST_APART:
+            limit = f"{one:g} and {other:g} are nearer than {LEAST_APART:g} mm: their holes in the lid would meet"
+            raise Refusal("points_mm", list(table.points_mm), limit)
     printer = choose("printer", table.printer, printers())
     wall, farthest = wall_distance(table, recipes), f"at {max(table.points_mm):g} mm"
     if math.isinf(wall):
@@ -446,25 +393,17 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     inside = _STEP_MM * math.ceil(2 * wall / _STEP_MM)
     size = lengths(table, inside, printer)
     tools = tuple(pieces(table, size))
+    bed = sorted((float(printer.bed_x_mm), float(printer.bed_y_mm)))
     for piece in printed_pieces(tools):
-        lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
-        needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)
-        if np.all(np.less_equal(needed_mm, bed)):
-            continue
-        short, long, high = needed_mm
-        fitting = (name for name, one in printers().items() if np.all(np.less_equal(needed_mm, _bed(one))))
-        limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {high:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
-        raise Refusal("printer", printer.name, limit, next(fitting, None))
+        sides = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
+        short, long, high = *np.sort(sides[:2]), sides[2]
+        if short > bed[0] or long > bed[1] or high > float(printer.bed_z_mm):
+            limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {high:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
+            raise Refusal("printer", printer.name, limit)
     layers = tuple(cast(table, size))
     volumes = tuple(float(realise(body.shape, SEGMENTS).volume()) for body in layers)
-    response = expected(table, recipes, inside / 2, wall, tuple(map(tissue_layer, tissue())))
-    return PhantomSet(table, recipes, printer, inside, size, tools, layers, volumes, response)
-
-
-def _bed(printer: Printer) -> tuple[float, float, float]:
-    """Return the bed's shorter and longer side, and the height above it."""
-    short, long = sorted((float(printer.bed_x_mm), float(printer.bed_y_mm)))
-    return short, long, float(printer.bed_z_mm)
+    response = expected(table, recipes, inside / 2, wall)
+    return PhantomSet(table, recipes, printer, size, tools, layers, volumes, response)
 
 
 def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
@@ -477,16 +416,15 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
         return rounded({"value": value, "low": low, "high": high}, 4)
 
     for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
-        source = f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}"
         found[layer.name] = {
             "status": "secondary",
-            "source": source[: LONGEST_SOURCE - len(also)] + also,
+            "source": f"{one.silicone.name} + {layer.thinner_pct:g} % thinner, {SOURCE}{also}",
             "thickness_mm": layer.thickness_mm,
             "density_kg_m3": rounded(1e3 * one.density_g_cm3, 4),
             "youngs_modulus_kpa": ranged(one.modulus_kpa, one.low_kpa, one.high_kpa),
             "poisson_ratio": {"value": POISSON, "status": "assumed", "source": "silicone hardly changes its volume"},
             "loss_factor": {
-                **ranged(*one.loss),
+                **ranged(*LOSS_FACTOR),
                 "status": "assumed",
                 "source": "tan delta of soft silicones at 100 to 150 Hz",
             },

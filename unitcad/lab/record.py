@@ -12,9 +12,9 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats
+from unitcad.lab import bandpass
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable
-from unitcad.lab.chains import LineFit, chains_of
-from unitcad.lab.chains.line import clip_level, fit_line, spectrum
+from unitcad.lab.line import LineFit, clip_level, fit_line, spectrum
 from unitcad.lab.readers import TIME_NAMES, UNITS, Layout, Recording, open_recording, plain, ratio, seconds, to_si
 from unitcad.meshcheck.rules.registry import Rule
 
@@ -271,11 +271,11 @@ _OF_THE_RATE = ("L102", "L108")
 
 @dataclass(frozen=True)
 class RecordResult:
-    """A record's figures; amplitudes (peak) and standard uncertainties in um. `ratio` is to the motor's own channel.
+    """A record's figures; amplitudes (peak) and standard uncertainties in um.
 
-    `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, without the
-    chains that the record is not fit for; `gains` the gain of a chain's filters at the line; `picture` the
-    samples and the spectrum, in the sensor's unit.
+    `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, or its ratio to
+    the motor's own channel, without the chains that the record is not fit for; `bandpass_gain` the gain of the filters
+    at the line, None without that chain; `picture` the samples and the spectrum, in the sensor's unit.
     """
 
     file: str
@@ -294,9 +294,8 @@ class RecordResult:
     snr: float = 0.0
     steady_s: float = 0.0
     masked: float = 0.0
-    ratio: float | None = None
     by_chain: dict[str, float] = field(default_factory=dict)
-    gains: dict[str, float] = field(default_factory=dict)
+    bandpass_gain: float | None = None
 
     @property
     def length_s(self) -> float:
@@ -311,7 +310,6 @@ class RecordResult:
         data |= {
             "length_s": self.length_s,
             "by_chain": self.by_chain,
-            "gains": self.gains,
             "findings": [one.as_dict() for one in self.findings],
         }
         return rounded(data, 6)
@@ -330,7 +328,6 @@ def measure_record(
     `band` is the band in which its line is searched, in Hz. Raises Refusal for a record that can't be read.
     """
     signal = open_signal(path, campaign.recording, sensors, shown)
-    chains = chains_of(campaign.chain)
     names = (shown, f"{shown}, motor")[: len(sensors)]
     samples, rate = signal.samples, signal.rate
     frequency, size = spectrum(np.where(np.isfinite(samples[:, 0]), samples[:, 0], 0.0), rate)
@@ -356,9 +353,9 @@ def measure_record(
         if each is None:
             message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz"
             return replace(none, findings=(*findings, finding("L111", where, message)))
-    fit, *motors = (each for each in fits if each)
-    motor = motors[0] if motors else None
-    for each, where in zip((fit, *motors), names, strict=False):
+    lines = [each for each in fits if each]
+    fit = lines[0]
+    for each, where in zip(lines, names, strict=True):
         for one in _of_line(each, rate, signal.raw_rate, where):
             if each is fit or one.code not in _OF_THE_RATE:
                 findings.append(one)
@@ -371,49 +368,42 @@ def measure_record(
     if below is not None:
         findings.append(finding("L117", shown, f"a stronger line is at about {below:.0f} Hz, below chain.band_hz"))
     scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
-    factor, ratio = abs(scales[0]), None
-    if motor is not None:
-        ratio = abs(fit.value * scales[0] / (motor.value * scales[1]))
-    by_chain, gains, unfit = {}, {}, []
-    part = samples[int(fit.start_s * rate) : int(np.ceil(fit.end_s * rate)) + 1]
-    for chain in chains:
-        if chain.gain:
-            gains[chain.name] = chain.gain(hertz)
-        if (gain := gains.get(chain.name, 1.0)) < LEAST_GAIN:
-            message = f"the filters of the chain {chain.name} pass {gain:.3f} of {hertz:.2f} Hz"
+    amplitudes, gain = {"line": [each.amplitude for each in lines]}, None
+    if "bandpass" in campaign.chain.use:
+        part = samples[int(fit.start_s * rate) : int(np.ceil(fit.end_s * rate)) + 1]
+        gain = bandpass.gain(hertz)
+        if gain < LEAST_GAIN:
+            message = f"the filters of the chain bandpass pass {gain:.3f} of {hertz:.2f} Hz"
             findings.append(finding("L106", shown, message))
-        try:
-            each = zip(part.T, (fit, *motors), scales, strict=True)
-            value, *below = [abs(scale) * chain.amplitude(x, rate, one) for x, one, scale in each]
-            reason = chain.unfit([fit, *motors])
-        except Refusal as refusal:
-            value, below, reason = 0.0, [], refusal.limit
-        if reason:
-            unfit.append(finding("L114", shown, f"{chain.name}: {reason}"))
+        if reason := bandpass.unfit(lines, len(part) / rate):
+            findings.append(finding("L114", shown, f"bandpass: {reason}"))
         elif gain >= LEAST_GAIN:
-            by_chain[chain.name] = value / below[0] if below else value
-    findings += unfit
+            amplitudes["bandpass"] = [bandpass.amplitude(x, rate) for x in part.T]
+    by_chain = {}
+    for name in campaign.chain.use:
+        if name in amplitudes:
+            value, *below = [scale * size for scale, size in zip(scales, amplitudes[name], strict=True)]
+            by_chain[name] = value / below[0] if below else value
     return replace(
         none,
         findings=tuple(findings),
         usable=not any(one.severity == "error" for one in findings),
-        amplitude_um=fit.amplitude * factor,
-        u_um=fit.u * factor,
+        amplitude_um=fit.amplitude * scales[0],
+        u_um=fit.u * scales[0],
         frequency_hz=hertz,
         drift=fit.drift,
         snr=fit.snr,
         steady_s=steady,
         masked=fit.masked,
-        ratio=ratio,
         by_chain=by_chain,
-        gains=gains,
+        bandpass_gain=gain,
     )
 
 
-def displacement(sensor: SensorTable, frequency_hz: float) -> complex:
-    """Return um of displacement per unit of the sensor at a frequency: a line over (j omega) once or twice."""
+def displacement(sensor: SensorTable, frequency_hz: float) -> float:
+    """Return um of displacement per unit of the sensor at a frequency: a line over omega once or twice."""
     si = to_si(sensor.unit, sensor.quantity, "sensor.unit")
-    return 1e6 * si / (2j * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
+    return 1e6 * si / (2 * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
 
 
 def _fits(samples: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> list[LineFit | None]:

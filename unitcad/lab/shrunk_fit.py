@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from unitcad.attenuation.edge.measured import MeasuredTable
-from unitcad.attenuation.edge.models import Model, bootstrap_range, sign_flip_p
+from unitcad.attenuation.edge.models import Model, sign_flip_p
 
 BETWEEN_LABS = 1.0
 """Assumed: another phantom, motor and axis shift a model as much as one unit scatters."""
@@ -53,12 +53,10 @@ class Shrunk:
 class Judged:
     """A model with each unit left out, unit by unit: ln(predicted/measured), and the predictive of ln measured.
 
-    `share`: the predictive's distribution function at the measured level. `by_stored`: the errors by the constants of
-    the paper's units alone, None without them.
+    `by_stored`: the errors by the constants of the paper's units alone, None without them.
     """
 
     errors: np.ndarray
-    share: np.ndarray
     centre: np.ndarray
     scale: np.ndarray
     df: int
@@ -69,11 +67,6 @@ class Judged:
     def score(self) -> float:
         """The geometric-mean factor."""
         return _factor(self.errors)
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """Bootstrap range of the score over units."""
-        return bootstrap_range(np.abs(self.errors))
 
     @property
     def own_score(self) -> float:
@@ -88,7 +81,7 @@ class Judged:
     @property
     def coverage(self) -> int:
         """How many units are in the middle 80 % of their prediction without them."""
-        return int(np.sum(np.abs(self.share - 0.5) <= 0.4))
+        return int(np.sum(np.abs(stdtr(self.df, -self.errors / self.scale) - 0.5) <= 0.4))
 
 
 def shrunk(model: Model, campaigns: Campaigns, own: bool = True) -> Shrunk:
@@ -131,7 +124,7 @@ def judge(model: Model, campaigns: Campaigns) -> Judged:
     by_stored = None
     if paper.any():
         by_stored = _logs(model, table, _fitted(model, table, paper.astype(float))) - logs
-    return Judged(errors, stdtr(df, -errors / scale), centre, scale, df, campaigns.own, by_stored)
+    return Judged(errors, centre, scale, df, campaigns.own, by_stored)
 
 
 def paired_difference(judged: Judged, other: Judged) -> tuple[float, float, float]:

@@ -9,6 +9,7 @@ over the record's length, and of the scatter of blocks.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
@@ -16,7 +17,9 @@ from scipy.signal import oaconvolve
 from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains import Chain, ChainTable, LineFit, Phase
+
+Phase = Callable[[Floats], Floats]
+"""A line's phase in rad over time in s."""
 
 BAND_HZ = (60.0, 250.0)
 HARMONICS = 3
@@ -30,9 +33,35 @@ RESOLVED = 1.5
 """Periods of the difference that a record needs to separate two lines."""
 
 
-def chain(table: ChainTable) -> Chain:
-    """Return the chain, whose amplitude is that of the fit that every record has."""
-    return Chain("line", lambda x, rate, fit: fit.amplitude)
+@dataclass(frozen=True)
+class LineFit:
+    """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
+
+    `u_noise` is the part of `u` from the noise next to the line. `value` is the complex amplitude against `phase`.
+    `drift` is the range of the frequency over its mean, `snr` the amplitude over the residual's standard deviation,
+    `scatter` the standard deviation of the amplitude of blocks over
+    their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
+    exceeds noise, otherwise 0; `missing` the fraction without numbers.
+    """
+
+    amplitude: float
+    u: float
+    u_noise: float
+    value: complex
+    frequency_hz: float
+    drift: float
+    snr: float
+    scatter: float
+    start_s: float
+    end_s: float
+    masked: float
+    dropped: float
+    missing: float
+    mains_hz: float
+    """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
+    second_hz: float
+    """The frequency of another line near this one; 0 if there is none."""
+    phase: Phase = field(compare=False, repr=False)
 
 
 def fit_line(
