@@ -5,8 +5,7 @@ import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor, UniformDisc
-from unitcad.attenuation.layered.integral import Problem
-from unitcad.attenuation.layered.quadrature import evaluate
+from unitcad.attenuation.layered.quadrature import Problem, evaluate
 from unitcad.errors import Refusal, UnitcadError
 
 

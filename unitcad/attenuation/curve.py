@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 from scipy import special
 
-from unitcad.attenuation.edge.level import sensitivities
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium, Response, components
 from unitcad.attenuation.layered.loads import UniformDisc
@@ -38,13 +37,6 @@ FAR = (
     "axial one."
 )
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
-_SLOPE_RTOL, _SLOPE_STEP = 1e-6, 0.01
-"""They leave the slopes off by less than 1e-3."""
-_NO_UNIT = (
-    "a laterally uniform tissue under the motor's disc: walls, caps, silicones, circuit and mass are not included"
-)
-
-
 RANGE = (
     "moduli, damping and thicknesses of the tissue, and the frequency, at both ends of their ranges, one kind at a "
     "time; and the effect of a unit on the skin, bonded or resting, by finite elements (`CONTACT`)"
@@ -123,32 +115,29 @@ def _case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple
     return tissue_medium(variant.tissue, end), load, 2.0 * np.pi * hertz
 
 
-def _response(variant: EstimateInput, drive: Drive, r: np.ndarray, end: Mapping[str, int], rtol: float) -> Response:
-    """Return the skin's displacement at radii r (m) under one pascal of a drive on the motor's disc."""
-    medium, load, omega = _case(variant, drive, end)
-    return medium.response(load, omega, r, rtol=rtol)
-
-
 def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     """Return the estimate's `layered`: the skin's motion under either drive, over that at the edge, with its spread.
 
     `drives`: the motor's own first, each over |u| at the edge under the same force. `flat_over_axial_per_newton`: |u|
-    by one newton that turns, over |u| by one newton of axial amplitude. `sensitivities`: of the decay to `EDGE_TO_MM`
-    under the motor's drive. The spread takes each kind of input (moduli, damping, thicknesses, frequency) by itself to
-    its low and high end; that of |u| has `CONTACT` in it.
+    by one newton that turns, over |u| by one newton of axial amplitude. The spread takes each kind of input (moduli,
+    damping, thicknesses, frequency) by itself to its low and high end; that of |u| has `CONTACT` in it.
     """
+
+    def response(drive: Drive, end: Mapping[str, int]) -> Response:
+        medium, load, omega = _case(variant, drive, end)
+        return medium.response(load, omega, r, rtol=rtol)
+
     r_mm = np.arange(EDGE_TO_MM + 1)
     r = variant.diameter / 2.0 + r_mm * 1e-3
     order: tuple[Drive, ...] = ("flat", "axial") if variant.drive == "flat" else ("axial", "flat")
     cases = [{}, *ends(variant)]
-    found = {drive: [_response(variant, drive, r, end, rtol) for end in cases] for drive in order}
+    found = {drive: [response(drive, end) for end in cases] for drive in order}
     ratio = [_size(flat) / _size(normal) for flat, normal in zip(found["flat"], found["axial"], strict=True)]
     return {
         "tissue": variant.tissue_name,
         "frequency_hz": variant.frequency.middle,
         "drive": variant.drive,
         "r_mm": [float(v) for v in r_mm],
-        "r_definition": "distance from the unit's edge outwards",
         "u_definition": U_DEFINITION,
         "drives": {drive: _drive_block(variant, drive, found[drive]) for drive in order},
         "flat_over_axial_per_newton": _curve(ratio),
@@ -156,34 +145,10 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         "|u| also includes the effect of a unit on the skin, bonded or resting, by finite elements",
         **({"far": FAR} if variant.tissue_name == "forearm" else {}),
         "published_curves": _paper_curves(variant, r),
-        "sensitivities": _sensitivities(variant),
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
         "assumptions": ASSUMPTIONS,
     }
-
-
-def _sensitivities(variant: EstimateInput) -> dict[str, Any]:
-    """Return d ln (|u| at `EDGE_TO_MM` over |u| at the edge) / d ln input under the motor's drive."""
-    seen = sensitivities(variant, _decays, _SLOPE_STEP)
-    return {
-        "of": f"|u| of the skin {EDGE_TO_MM} mm from the unit's edge over |u| at the edge",
-        "drive": variant.drive,
-        "by": seen["by"],
-        "not_included": _NO_UNIT,
-    }
-
-
-def _decays(variants: Sequence[EstimateInput]) -> list[float]:
-    """Return |u| at `EDGE_TO_MM` over |u| at the edge of each variant under its motor's drive; alike ones once."""
-    decays: dict[Any, float] = {}
-    for one in variants:
-        key = one.tissue, one.frequency, one.motor_diameter, one.diameter
-        if key not in decays:
-            r = one.diameter / 2.0 + np.array([0.0, 1e-3 * EDGE_TO_MM])
-            edge, far = _size(_response(one, one.drive, r, {}, _SLOPE_RTOL))
-            decays[key] = float(far / edge)
-    return [decays[one.tissue, one.frequency, one.motor_diameter, one.diameter] for one in variants]
 
 
 def _size(one: Response) -> np.ndarray:

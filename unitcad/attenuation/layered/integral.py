@@ -9,19 +9,18 @@ path is bounded by the kernel itself, sampled there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, static_kernel
-from unitcad.attenuation.layered.medium import Stack
 from unitcad.attenuation.layered.propagation import Array, Material
 from unitcad.attenuation.layered.quadrature import (
     MAX_PANELS,
     PHASE,
     Evaluated,
     Poles,
+    Problem,
     around,
     closeness,
     cut_pieces,
@@ -167,7 +166,6 @@ def _beyond(k: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 _MAX_ROUNDS = 40
-_MOST_SAMPLES = 8_192  # kernel values worked out at once
 _PHASE_RTOL = 1e-8
 """From which on pieces are of `PHASE`: there the rule is off by some 1e-9 of the waves over a piece."""
 _FIRST_PIECES = 32
@@ -190,38 +188,6 @@ _WORTH = 0.2
 A tighter rtol that is not reached then is at most 1.25 times worse than a looser one, but for rare media: one of 2,000
 random ones was 2.5 times worse.
 """
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A medium at omega (rad/s) under a load, seen at radii r (m), shape (n,).
-
-    reference: the static half-space that is taken out.
-    """
-
-    medium: Stack
-    omega: float
-    load: UniformDisc
-    r: np.ndarray
-    reference: Material | None = None
-
-    def kernel(self, k: Array) -> Array:
-        """Return k C(k), less the static one, a row an order of the load; the load's transform is not in it."""
-        chunks = [self._compliance(k[first : first + _MOST_SAMPLES]) for first in range(0, k.size, _MOST_SAMPLES)]
-        return k * np.concatenate(chunks, axis=1) - self.taken_out[:, None]
-
-    def _compliance(self, k: Array) -> Array:
-        if self.load.direction == "normal":
-            return self.medium.columns([1], k, self.omega)[:, 0]
-        u_r, u_z = self.medium.columns([0], k, self.omega)[:, 0]
-        u_theta = self.medium.shear_column(k, self.omega)
-        return np.array([(u_r + u_theta) / 2.0, (u_r - u_theta) / 2.0, u_z])
-
-    @cached_property
-    def taken_out(self) -> Array:
-        """The static kernel that is taken out, shape (rows,)."""
-        rows = len(self.load.orders)
-        return static_kernel(self.reference, self.load.direction) if self.reference else np.zeros(rows)
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import factorial2
 
-from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, bessels
+from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, bessels, static_kernel
+from unitcad.attenuation.layered.medium import Stack
 from unitcad.attenuation.layered.propagation import Array, Material
 
 PHASE = 8.0 * np.pi
@@ -63,7 +64,10 @@ def from_origin(end: float, stop: float, span: float, materials: tuple[Material,
     """
     longest = PHASE / span
     line = np.linspace(0.0, end, max(_LEAST_PANELS, int(np.ceil(end / longest))) + 1)
-    line = _thinned(line, _BEYOND * max(abs(m.ks2) ** 0.5 for m in materials))
+    # Beyond there a panel is as long as a third of the line, or as the most pieces.
+    first = int(np.searchsorted(line, _BEYOND * max(abs(m.ks2) ** 0.5 for m in materials)))
+    kept = np.arange(len(line) - 1, first, -min((len(line) - 1) // 3, MOST_PIECES))
+    line = np.concatenate([line[: first + 1], line[kept[::-1]]])
     line = _continued(line if end > 0 else np.array([0.0, longest / 8.0]), stop, longest)
     shortest = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
     if 0.0 < shortest < line[1]:
@@ -79,13 +83,6 @@ def from_origin(end: float, stop: float, span: float, materials: tuple[Material,
 def onwards(start: float, stop: float, span: float) -> Array:
     """Return the panels beyond all poles, from `start` to `stop`."""
     return _plain(_continued(np.array([start]), stop, PHASE / span))
-
-
-def _thinned(line: np.ndarray, start: float) -> np.ndarray:
-    """Leave out corners from `start` on, so that panels are as long as a third of the line, or the most pieces."""
-    first = int(np.searchsorted(line, start))
-    kept = np.arange(len(line) - 1, first, -min((len(line) - 1) // 3, MOST_PIECES))
-    return np.concatenate([line[: first + 1], line[kept[::-1]]])
 
 
 def _continued(line: np.ndarray, stop: float, longest: float) -> np.ndarray:
@@ -259,21 +256,39 @@ _CANCELLED = 4e-15
 _SINGLE = 1e-7
 """Uncertainty of a pole below which a panel has no other, or only a negligible one."""
 _CHUNK = 200_000  # integrand values held at once
+_MOST_SAMPLES = 8_192  # kernel values worked out at once
 
 
-class Seen(Protocol):
-    """A load, seen at radii r (m), shape (n,)."""
+@dataclass(frozen=True)
+class Problem:
+    """A medium at omega (rad/s) under a load, seen at radii r (m), shape (n,).
 
-    @property
-    def load(self) -> UniformDisc: ...
+    reference: the static half-space that is taken out.
+    """
 
-    @property
-    def r(self) -> np.ndarray: ...
+    medium: Stack
+    omega: float
+    load: UniformDisc
+    r: np.ndarray
+    reference: Material | None = None
 
-    @property
+    def kernel(self, k: Array) -> Array:
+        """Return k C(k), less the static one, a row an order of the load; the load's transform is not in it."""
+        chunks = [self._compliance(k[first : first + _MOST_SAMPLES]) for first in range(0, k.size, _MOST_SAMPLES)]
+        return k * np.concatenate(chunks, axis=1) - self.taken_out[:, None]
+
+    def _compliance(self, k: Array) -> Array:
+        if self.load.direction == "normal":
+            return self.medium.columns([1], k, self.omega)[:, 0]
+        u_r, u_z = self.medium.columns([0], k, self.omega)[:, 0]
+        u_theta = self.medium.shear_column(k, self.omega)
+        return np.array([(u_r + u_theta) / 2.0, (u_r - u_theta) / 2.0, u_z])
+
+    @cached_property
     def taken_out(self) -> Array:
-        """Return the constant subtracted from each row of the kernel, shape (rows,)."""
-        ...
+        """The static kernel that is taken out, shape (rows,)."""
+        rows = len(self.load.orders)
+        return static_kernel(self.reference, self.load.direction) if self.reference else np.zeros(rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,7 +347,7 @@ class Evaluated:
         return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
 
 
-def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluated:
+def evaluate(problem: Problem, panels: Array, kernel: Array, phase: float) -> Evaluated:
     """Integrate over each panel, on the axis or off it, its kernel (with dk/ds) of shape (rows, panels, nodes).
 
     phase: the most that the fastest Bessel product may turn over a piece of a panel.
@@ -349,19 +364,19 @@ def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluate
     series = np.abs(kernel @ _to_legendre().T)
     rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), _rounding(peak, close))
     slope = wavenumbers(panels, panels[:, :2])[1]
-    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
+    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(problem)
     pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
     off_axis = np.any(panels[:, :2].imag, axis=1)
-    shape = (len(panels), len(kernel), seen.r.size)
+    shape = (len(panels), len(kernel), problem.r.size)
     parts, covered, swing = np.empty(shape, dtype=np.complex128), np.empty(shape), np.empty(shape)
-    step = max(1, _CHUNK // (NODES * seen.r.size * len(kernel)))
+    step = max(1, _CHUNK // (NODES * problem.r.size * len(kernel)))
     for which in (np.flatnonzero(~off_axis), np.flatnonzero(off_axis)):
         ends = np.cumsum(pieces[which])
         for at in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
             if at.size:
-                found = _integrated(seen, panels[at], pieces[at], kernel[:, at], series[:, at])
+                found = _integrated(problem, panels[at], pieces[at], kernel[:, at], series[:, at])
                 parts[at], covered[at], swing[at] = found
-    return Evaluated(parts, covered, swing, kernel, close, peak, rest, seen.taken_out)
+    return Evaluated(parts, covered, swing, kernel, close, peak, rest, problem.taken_out)
 
 
 def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
@@ -369,12 +384,12 @@ def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
     return ROUNDING * close * peak
 
 
-def _span(seen: Seen) -> float:
-    return float(seen.r.max()) + seen.load.radius
+def _span(problem: Problem) -> float:
+    return float(problem.r.max()) + problem.load.radius
 
 
 def _integrated(
-    seen: Seen, panels: Array, pieces: np.ndarray, kernel: Array, series: np.ndarray
+    problem: Problem, panels: Array, pieces: np.ndarray, kernel: Array, series: np.ndarray
 ) -> tuple[Array, np.ndarray, np.ndarray]:
     """Return the integrals over panels, all on the axis or all off it, each cut into so many `pieces`.
 
@@ -392,7 +407,7 @@ def _integrated(
         onto, restricted = _spread(int(count))
         values, sizes = products(kernel[:, here[::count]], onto), series[:, here[::count]] @ restricted
         kernel[:, here], series[:, here] = (one.reshape(len(kernel), -1, NODES) for one in (values, sizes))
-    values, swing, most = _waves(seen, cut)
+    values, swing, most = _waves(problem, cut)
     found = (
         products(kernel, values),
         np.abs(values).sum(axis=-2),
@@ -414,7 +429,7 @@ def _spread(number: int) -> tuple[np.ndarray, np.ndarray]:
     return (degrees @ _to_legendre()).T, bounds.reshape(-1, NODES).T
 
 
-def _waves(seen: Seen, panels: Array) -> tuple[Array, np.ndarray, np.ndarray]:
+def _waves(problem: Problem, panels: Array) -> tuple[Array, np.ndarray, np.ndarray]:
     """Return the weights of panels over which the waves turn little, shape (rows, panels, nodes, radii).
 
     With them `swing` (panels, degrees) and `most` (rows, panels, radii): a bound of the rule's error is the sum of the
@@ -425,7 +440,7 @@ def _waves(seen: Seen, panels: Array) -> tuple[Array, np.ndarray, np.ndarray]:
     meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times a factor that hardly changes
     within six halves: there their envelope replaces the weight. Off the axis both grow by e^{|Im k| span}.
     """
-    load, r, span = seen.load, seen.r, _span(seen)
+    load, r, span = problem.load, problem.r, _span(problem)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
     k = nodes(panels)[0]
     if not np.any(panels[:, :2].imag):
