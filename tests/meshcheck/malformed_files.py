@@ -46,6 +46,7 @@ def files():
         ("package.stl", "F005", package()),
         ("mesh.3mf", "F005", good),
         ("notes.txt", "F005", "hello"),
+        ("scene.glb", "F005", b"glTF\x02\0\0\0" + bytes(12)),
         ("object.stl", "F005", OBJ),
         ("comment-first.stl", "F005", "# made by hand\n" + text),
         ("json.stl", "F005", '{"error": 1}'),

@@ -13,7 +13,6 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "meshcheck"))
 
-from glb_files import packed, scene
 from polygon_files import every_way
 from shapes import mesh_xml, model_xml, package, stl, text_stl
 
@@ -51,8 +50,6 @@ def files():
         '<object id="1"><components><component objectid="2" transform="1 0 0 0 1 0 0 0 1 5 5 5"/></components></object>'
     )
     made["materials.3mf"] = package(model_xml(materials), compression=zipfile.ZIP_STORED)
-    small = (points * 0.001).astype("<f4")
-    made["a.glb"] = packed(*scene(small, triangles.astype("<u2"), [{"mesh": 0, "rotation": [0.6, 0.0, 0.0, 0.8]}]))
     return made
 
 

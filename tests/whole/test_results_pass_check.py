@@ -1,6 +1,9 @@
-"""What a build writes passes `unitcad check` as it is, against its manifest too."""
+"""What a build writes passes `unitcad check` as it is, against its manifest too; another reader takes its GLB files."""
+
+from pathlib import Path
 
 import pytest
+import trimesh
 
 from tests.in_process import unitcad
 from unitcad.export.printing import stl
@@ -42,3 +45,9 @@ def passes(subject, out, formats, *sets):
     for arguments in ([folder], ["--manifest", folder]):
         checked = unitcad("check", *arguments)
         assert checked.returncode == 0, checked.stdout
+    drawn = list(Path(folder).rglob("*.glb"))
+    assert bool(drawn) == ("glb" in formats)
+    for file in drawn:
+        for name, mesh in trimesh.load_scene(file).geometry.items():
+            mesh.merge_vertices(merge_norm=True)  # a corner has a normal for each face
+            assert mesh.is_volume, f"{name} of {file.name}: open, or wound apart, or inside out"

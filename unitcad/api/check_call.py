@@ -97,7 +97,7 @@ def check(
     timeout: float | None = None,
     jobs: int = 1,
 ) -> CheckResult:
-    """Check mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with an extra.
+    """Check mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, and STEP with an extra.
 
     Parameters
     ----------

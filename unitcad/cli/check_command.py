@@ -222,7 +222,7 @@ def check(
 ) -> None:
     """Check mesh files as they are, before any repair.
 
-    Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP if an extra with a B-rep kernel is installed.
+    Reads STL, 3MF, OBJ, PLY and OFF, and STEP if an extra with a B-rep kernel is installed.
     """
     if explain is not None:
         sys.stdout.write(_explained([part.strip() for part in ",".join(explain).split(",")]) + "\n")

@@ -1,4 +1,4 @@
-"""Checks of mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB and STEP, by named rules.
+"""Checks of mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF and STEP, by named rules.
 
 `check_file(path, Options())` returns the `FileReport` of one file, `check_mesh(vertices, faces)` that of a mesh.
 Of unitcad it needs only `workers`, `errors`, `text`, `files` and `geometry`, and knows nothing of CAD.

@@ -18,7 +18,7 @@ from manifold3d import Manifold
 from unitcad.geometry.arrays import Floats, cross, extent
 from unitcad.geometry.boxes import box_pairs
 from unitcad.meshcheck.findings import Facts, Finding, Location, counted, drawn_meshes, ending, number, point
-from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_step, representable, solid_of, weld_exact
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, representable, solid_of, weld_exact
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
 from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.read_3mf import SOLID, Build, Instance, Key, read_build
@@ -122,36 +122,6 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, strict: bool = False) -> Ch
     if part.solid:
         facts = replace(facts, volume_mm3=float(topology.volumes.sum()))
     return CheckedMesh(in_file(findings, mesh), facts, part)
-
-
-def check_assembly(mesh: Mesh, deadline: Deadline, *, strict: bool = False) -> CheckedMesh | None:
-    """Check objects of which each passes by itself as solids that may touch; None for any other mesh.
-
-    float32 moves faces that touch a little through each other: common parts thinner than four steps are none.
-    """
-    source = mesh.source
-    if source is None or source.polygons is not None or not 1 < len(source.starts) <= MOST:
-        return None
-    solids, facts = list[Solid](), list[Facts]()
-    for start, faces in zip(source.starts.tolist(), np.split(mesh.faces, source.starts[1:]), strict=True):
-        object = Mesh(*weld_exact(mesh.vertices[faces].astype(np.float32)), indexed=False)
-        checked = check_surface(object, deadline, strict=strict)
-        if checked.findings or checked.facts.volume_mm3 is None:
-            return None
-        solids.append(Solid(object, checked.facts.volume_mm3, source.object(start) or f"object {len(solids) + 1}"))
-        facts.append(checked.facts)
-    low, high = extent(mesh.vertices[mesh.faces.reshape(-1)])
-    whole = Facts(
-        triangles=len(mesh.faces),
-        vertices=len(mesh.vertices),
-        shells=sum(each.shells or 0 for each in facts),
-        volume_mm3=sum(each.volume_mm3 or 0.0 for each in facts),
-        area_mm2=sum(each.area_mm2 or 0.0 for each in facts),
-        bbox_mm=(tuple(low.tolist()), tuple(high.tolist())),
-        watertight=True,
-    )
-    findings = overlapping(solids, "objects", deadline, thick=4 * float32_step(mesh.vertices))
-    return CheckedMesh(tuple(findings), whole, Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick))
 
 
 def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:

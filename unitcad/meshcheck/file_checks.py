@@ -22,7 +22,7 @@ from unitcad.errors import UnitcadError
 from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
-from unitcad.meshcheck.builds import CheckedMesh, check_3mf, check_assembly, check_on_bed, check_step, check_surface
+from unitcad.meshcheck.builds import check_3mf, check_on_bed, check_step, check_surface
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, drawing, ending, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers import kind_of
@@ -132,7 +132,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
         raise F005.unreadable(f"suffix {path.suffix!r} is not a mesh format; known: {known}")
     if not data:
         raise F001.unreadable("the file is empty")
-    content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP", "glb": "binary glTF"}.get(kind)
+    content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP"}.get(kind)
     if content != wanted:
         raise F005.unreadable(f"named {path.suffix}, but the content is {content or f'no {wanted}'}")
     view = memoryview(data)
@@ -140,20 +140,17 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
         return check_3mf(view, options, deadline)
     if kind == "step":
         return check_step(path, view, options, deadline)
-    if kind == "glb" and options.unit is None:
-        options = replace(options, unit="meter")  # as the format says
     findings: list[Finding] = []
     with keeping(findings, change=ending):
-        mesh = readers.reader_of(kind, options.unit)(view, options.limits, deadline, findings)
+        mesh = readers.reader_of(kind)(view, options.limits, deadline, findings)
     del view, data
     if mesh is None:
         return ending(findings), Facts()
-    factor = UNITS_MM[options.unit] if options.unit and kind != "glb" else 1.0
+    factor = UNITS_MM[options.unit] if options.unit else 1.0
     if factor != 1.0:
         mesh = replace(mesh, vertices=mesh.vertices * factor)
     with keeping(findings):
-        whole = check_assembly(mesh, deadline, strict=options.strict) if kind == "glb" else None
-        more, facts = _check_surface(mesh, options, deadline, whole)
+        more, facts = _check_surface(mesh, options, deadline)
     return findings + more, facts
 
 
@@ -171,11 +168,9 @@ def _bytes_of(path: Path, limits: Limits) -> bytes:
         raise F012.unreadable(f"cannot be read: {why.removeprefix(f'{path}: ')}") from error
 
 
-def _check_surface(
-    mesh: Mesh, options: Options, deadline: Deadline, checked: CheckedMesh | None = None
-) -> tuple[list[Finding], Facts]:
-    """Check the mesh of a file that has no instances; `checked`: its surface, if that is done."""
-    checked = checked or check_surface(mesh, deadline, strict=options.strict)
+def _check_surface(mesh: Mesh, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    """Check the mesh of a file that has no instances."""
+    checked = check_surface(mesh, deadline, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
         with keeping(findings, facts):

@@ -63,7 +63,7 @@ def point(values: Iterable[SupportsFloat]) -> Point:
 class Location:
     """Place: faces' indices (from 0, file order), a point in mm, a line (from 1), a part of the package, an object.
 
-    A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
+    A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
     `line` is that of the first face if the format has lines, otherwise that of the fault. `region`, for pictures: its
     triangles in the mesh of number `mesh`.

@@ -8,7 +8,6 @@ The reader of a format is the function of its module's name in this folder: `.st
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from importlib import import_module
 from pathlib import PurePath
 from pkgutil import iter_modules
@@ -16,7 +15,6 @@ from pkgutil import iter_modules
 from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.rules.f_file import Deadline, Limits
-from unitcad.meshcheck.rules.s_scale import UNITS_MM
 
 Reader = Callable[[memoryview, Limits, Deadline, list[Finding]], Mesh | None]
 """A function that reads a mesh from bytes and adds findings about the file itself.
@@ -61,18 +59,14 @@ def foreign(head: bytes) -> str | None:
 
 
 def kind_of(path: str) -> str:
-    """Return the reader for a file: stl, 3mf, obj, ply, off, glb, step, or "" for a suffix that none reads."""
+    """Return the reader for a file: stl, 3mf, obj, ply, off, step, or "" for a suffix that none reads."""
     suffix = PurePath(path).suffix.lower()
     if suffix not in SUFFIXES:
         return ""
     return {".stp": "step"}.get(suffix, suffix[1:])
 
 
-def reader_of(kind: str, unit: str | None = None) -> Reader:
-    """Return the reader of a format with one mesh; its module is loaded by the first file that needs it.
-
-    The numbers of a GLB, in `unit` or metres, become mm on reading.
-    """
+def reader_of(kind: str) -> Reader:
+    """Return the reader of a format with one mesh; its module is loaded by the first file that needs it."""
     name = f"{_READ}{kind}"
-    read = getattr(import_module(f"{__name__}.{name}"), name)
-    return partial(read, unit_mm=UNITS_MM[unit or "meter"]) if kind == "glb" else read
+    return getattr(import_module(f"{__name__}.{name}"), name)

@@ -2,7 +2,7 @@
 
 A text is taken in blocks of whole lines, so that what is made on the way has the size of a block.
 
-Polygons as a file has them, cut into triangles: input from the readers of PLY, OBJ, OFF and GLB.
+Polygons as a file has them, cut into triangles: input from the readers of PLY, OBJ and OFF.
 
 A polygon is cut in its own plane. A fan from a corner is taken if all its triangles turn the same way; concave
 polygons, and those with corners on a line, are cut by manifold3d.

@@ -14,11 +14,12 @@ from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Location
 from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers import threemf_schema as schema
-from unitcad.meshcheck.readers.rows import NEWLINE, NOT_FINITE, SPACE, numbers_of, table_of
+from unitcad.meshcheck.readers.rows import NOT_FINITE, SPACE, numbers_of, table_of
 from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, parse
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.f_file import F004, F011, Limits, Unreadable, not_a_number
 from unitcad.meshcheck.rules.p_package import P010, P013, P015, P016, P017, P018
+from unitcad.meshcheck.rules.s_scale import UNITS_MM
 from unitcad.meshcheck.rules.v_values import V001
 
 _NOT_FINITE = re.compile(NOT_FINITE, re.ASCII | re.IGNORECASE)
@@ -72,9 +73,9 @@ _PLAIN = {
 _WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
 _AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
 _SHORTEST = 1500  # bytes; a shorter list costs the parser less
-_LONGEST_GAP = 200  # bytes between two numbers
 _MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
 _QUOTE = ord('"')
+_BLANKS = b" \t\r\n"
 _DIGITS = table_of(b"0123456789")
 _IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
 
@@ -141,60 +142,31 @@ def _read_block(block: bytes, element: bytes, known: tuple[str, ...]) -> Floats 
         return None
     text = np.frombuffer(block, np.uint8)
     quotes = np.flatnonzero(text == _QUOTE)
-    each = 2 * len(names)
-    if len(quotes) % each or _AFTER.fullmatch(block, int(quotes[-1])) is None:
+    if len(quotes) % (2 * len(names)) or _AFTER.fullmatch(block, int(quotes[-1])) is None:
         return None
-    quotes = quotes.reshape(-1, each)
-    if not _same_between(text, quotes, block, head.group()):
-        return None
-    numbers = _numbers(text, quotes[:, ::2] + 1, quotes[:, 1::2], whole=known is _COLUMNS)
-    if numbers is None:
-        return None
-    if known is _XYZ:
-        values = numbers[:, [names.index(axis) for axis in known]]
-        return values if (np.abs(values) <= LARGEST).all() else None
-    values = np.full((len(numbers), LINE + 1), -1)
-    values[:, [known.index(name) for name in names]] = numbers
-    first = block.index(b"<")
-    starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
-    values[:, LINE] = np.searchsorted(np.flatnonzero(text == NEWLINE), starts)
-    return values if values[:, LINE - 1].all() else None  # no resource has the id 0
-
-
-def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
-    """Tell whether the text between the numbers of the first element, and after it, repeats in the others."""
-    opened, closed = quotes.ravel()[::2], quotes.ravel()[1::2]
-    width = opened[1:] - closed[:-1]
-    each = quotes.shape[1] // 2
-    for k in range(each):
-        some, gap = closed[:-1][k::each], width[k::each]
-        if not len(some):
-            continue
-        if gap[0] > _LONGEST_GAP or not (gap == gap[0]).all():
-            return False
-        pattern = text[some[0] : some[0] + gap[0] + 1]
-        if k == each - 1:
-            after = _AFTER.match(pattern.tobytes())
-            if after is None or pattern.tobytes()[after.end() :] != head.lstrip():
-                return False
-        for i, character in enumerate(pattern.tolist()):
-            if not (text[some + i] == character).all():
-                return False
-    return True
-
-
-def _numbers(text: Ints, begin: Ints, end: Ints, *, whole: bool) -> Floats | Ints | None:
-    """Return the numbers between quotes, shape as `begin`; None if one may be none."""
-    size = end - begin
+    begin, end = quotes[::2].reshape(-1, len(names)) + 1, quotes[1::2].reshape(-1, len(names))
+    size, whole = end - begin, known is _COLUMNS
     if size.min() < 1 or (whole and size.max() > _MOST_DIGITS):
         return None
     marks = np.zeros(len(text) + 1, np.int8)
     marks[begin], marks[end] = 1, -1
     inside = np.cumsum(marks[:-1], dtype=np.int8).view(bool)
-    if not (_DIGITS if whole else _IN_NUMBERS)[text[inside]].all():
+    between = text[~inside].tobytes().lstrip(_BLANKS)
+    period = between[: between.find(b"<", 1)] if len(begin) > 1 else between
+    blanks = period[len(period.rstrip(_BLANKS)) :] if len(begin) > 1 else b""
+    if between + blanks != period * len(begin) or not (_DIGITS if whole else _IN_NUMBERS)[text[inside]].all():
         return None
-    values = numbers_of(np.where(inside, text, np.uint8(SPACE)).tobytes(), begin.size, integers=whole)
-    return None if values is None else values.reshape(begin.shape)
+    numbers = numbers_of(np.where(inside, text, np.uint8(SPACE)).tobytes(), begin.size, integers=whole)
+    if numbers is None:
+        return None
+    numbers = numbers.reshape(begin.shape)
+    if known is _XYZ:
+        values = numbers[:, [names.index(axis) for axis in known]]
+        return values if (np.abs(values) <= LARGEST).all() else None
+    values = np.full((len(numbers), LINE + 1), -1)
+    values[:, [known.index(name) for name in names]] = numbers
+    values[:, LINE] = block.count(b"\n", 0, block.index(b"<")) + period.count(b"\n") * np.arange(len(numbers))
+    return values if values[:, LINE - 1].all() else None  # no resource has the id 0
 
 
 _DEPTH = 60
@@ -283,9 +255,16 @@ class _Reader:
         if done.space == schema.CORE and done.name in ("vertices", "triangles"):
             self._take_blocks()
         elif done.space == schema.CORE and done.name == "mesh":
-            self._close_mesh()
+            self._flush()
+            if isinstance(self.resource, Object):
+                self.resource.mesh = Triangles(np.concatenate(self.vertices), np.concatenate(self.rows))
+            self.vertices, self.rows = [], []
         elif done.name == "object" and isinstance(self.resource, Object):
-            self._close_object(self.resource)
+            shapes = (self.resource.mesh is not None) + bool(self.resource.components)
+            if not shapes and not self.resource.other_shape:
+                self.model.add(P017, f"object {self.resource.id} has neither mesh nor components")
+            elif shapes == 2:
+                self.model.add(P017, f"object {self.resource.id} has a mesh and components")
         if self.stack[-1].name == "resources":
             self.resource = None
 
@@ -368,10 +347,9 @@ class _Reader:
 
     def _take_model(self, attributes: dict[str, str]) -> None:
         self.model.unit = attributes.get("unit", "millimeter")
-        if self.model.unit not in schema.UNITS:
+        if self.model.unit not in UNITS_MM:
             self.model.add(P010, f"unit {self.model.unit[:40]!r}")
-        self.model.required = attributes.get("requiredextensions", "").split()
-        for prefix in self.model.required:
+        for prefix in attributes.get("requiredextensions", "").split():
             uri = self.model.namespaces.get(prefix)
             if uri is None:
                 self.model.add(P016, f"required extension {prefix!r} has no namespace")
@@ -443,18 +421,6 @@ class _Reader:
         self.vertices.append(np.array(self.numbers).reshape(-1, 3))
         self.rows.append(np.array(self.indices).reshape(-1, LINE + 1))
         self.numbers, self.indices = array("d"), array("q")
-
-    def _close_mesh(self) -> None:
-        self._flush()
-        if isinstance(self.resource, Object):
-            self.resource.mesh = Triangles(np.concatenate(self.vertices), np.concatenate(self.rows))
-        self.vertices, self.rows = [], []
-
-    def _close_object(self, resource: Object) -> None:
-        if resource.mesh is None and not resource.components and not resource.other_shape:
-            self.model.add(P017, f"object {resource.id} has neither mesh nor components")
-        if resource.mesh is not None and resource.components:
-            self.model.add(P017, f"object {resource.id} has a mesh and components")
 
 
 # Extensions whose elements take the place of an object's mesh, or stand on its vertices.

@@ -128,7 +128,6 @@ class Relation:
 
     kind: str
     target: str
-    shown: str
 
 
 @dataclass
@@ -238,7 +237,7 @@ class Package:
                 add = self.add_lenient if kind == THUMBNAIL else self.add
                 add(rule, f"target {target!r} is not in the package", rels)
                 continue
-            yield Relation(kind, part, target)
+            yield Relation(kind, part)
 
 
 def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict: bool = False) -> Package:
@@ -253,7 +252,9 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
     bombs = []
     for info in entries:
-        if _unsafe(info.filename):
+        name = info.filename
+        segments = [unquote(segment) for segment in name.removesuffix("/").split("/")]
+        if _ODD.search(name) or _SCHEME.match(name) or any(not part or part.endswith(".") for part in segments):
             package.add(P005, f"{info.filename!r} is no plain relative name", info.filename)
         if not info.filename or info.is_dir():
             continue
@@ -268,12 +269,6 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise Unreadable(*package.findings, P008.finding(bombs[0], len(bombs)))
     _content_types(package)
     return package
-
-
-def _unsafe(name: str) -> bool:
-    """Return whether a zip entry's name may not be a part's: it is not relative, climbs, or systems read it apart."""
-    segments = [unquote(segment) for segment in name.removesuffix("/").split("/")]
-    return bool(_ODD.search(name) or _SCHEME.match(name) or any(not part or part.endswith(".") for part in segments))
 
 
 def _content_types(package: Package) -> None:

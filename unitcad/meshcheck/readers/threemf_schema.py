@@ -28,7 +28,6 @@ IMPLICIT = "http://schemas.3mf.io/3dmanufacturing/implicit/2023/12"
 KNOWN = {CORE, MATERIAL, PRODUCTION, SLICE, BEAM, BALLS, TRIANGLE_SETS, BOOLEAN, DISPLACEMENT}
 KNOWN |= {OLD_DISPLACEMENT, ALTERNATIVES, VOLUMETRIC, IMPLICIT}
 
-UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
 _LIMIT = 2**31
 Test = Callable[[str], object]
 """Whether an attribute's text is of its type, as the 3MF schemas name it, by truth."""
@@ -204,7 +203,6 @@ class Model:
     part: str
     unit: str = "millimeter"
     namespaces: dict[str, str] = field(default_factory=dict)
-    required: list[str] = field(default_factory=list)
     resources: dict[int, Resource] = field(default_factory=dict)
     items: list[Use] = field(default_factory=list)
     foreign: set[int] = field(default_factory=set)

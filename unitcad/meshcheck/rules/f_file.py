@@ -130,8 +130,8 @@ F011 = Rule("""
 class Limits:
     """Bounds on one file.
 
-    `seconds` is wall time. `ratio` is inflated over packed size of a zip entry. `max_instances`: the most that a 3MF or
-    GLB may place, counted before it is expanded.
+    `seconds` is wall time. `ratio` is inflated over packed size of a zip entry. `max_instances`: the most that a 3MF
+    may place, counted before it is expanded.
     """
 
     max_faces: int = 10_000_000

@@ -23,8 +23,7 @@ G002 = Rule("""
     Two shells share volume: one faces outwards inside the other, or where their faces meet, they share more than a
     millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. A warning, unless
     --strict is given, if the part that they share is less than 0.02 mm thick. In a 3MF file a warning, since the core
-    specification (4.1) says what is solid. The solids of a STEP file are compared by meshes of them,
-    as are the nodes of a GLB that pass by themselves.
+    specification (4.1) says what is solid. The solids of a STEP file are compared by meshes of them.
     Example: A box lies inside a larger one, and both face outwards.
     Fix: Unite the bodies with a boolean.
 """)

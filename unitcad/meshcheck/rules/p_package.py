@@ -1,4 +1,4 @@
-"""3MF packages, P001 to P020, and the scene of a GLB: their readers' findings before there is a mesh."""
+"""3MF packages, P001 to P020: the reader's findings before there is a mesh."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ P011 = Rule("""
 P012 = Rule("""
     P012 error: dangling, forward or recursive object reference
     A build item or component names an object that is not there, is defined later, may not be used so (type other), or
-    contains itself, as may a node of a GLB. A component of type other is a warning, unless --3mf-strict is given, since
+    contains itself. A component of type other is a warning, unless --3mf-strict is given, since
     slicers keep modifiers so; it is not part of the build. Example: An item has `objectid="3"`, and the only object of
     the model has the id 1. Fix: Define each object before its use, and leave none out.
 """)
@@ -121,7 +121,7 @@ P015 = Rule("""
 
 P016 = Rule("""
     P016 error: unknown required extension
-    requiredextensions names a prefix without a namespace, or a 3MF or GLB needs an extension that this reader does not
+    requiredextensions names a prefix without a namespace, or an extension that this reader does not
     know, so the model may mean something else than it seems.
     Example: `requiredextensions="x"` without `xmlns:x`.
     Fix: Leave the extension out, or check the file with a program that knows it.
