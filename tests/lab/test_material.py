@@ -46,6 +46,11 @@ EXACT_15 = float(neo_hooke(np.array(0.15))) / 0.15
 """Secant modulus at 15 % of the synthetic silicone, Pa."""
 
 
+def codes(result):
+    """Return the names of a result's warnings."""
+    return {one.partition(":")[0] for one in result.warnings}
+
+
 def _table(path, head, columns, lines=(), sign=","):
     rows = [sign.join(f"{value:.9g}" for value in row) for row in np.stack(columns, axis=1)]
     path.write_text("\n".join([*lines, head, *rows, ""]), "utf-8")
@@ -176,7 +181,7 @@ def test_rows_without_a_number_are_counted_and_a_gap_gives_no_modulus(tmp_path):
     curve = read_curve(_pull(tmp_path / "a.csv", STRAIN, few), {}, Specimen())
     result = evaluate([curve], (0.12, 0.24))
     assert curve.lost == 3
-    assert next(one.message for one in result.warnings if one.code == "gaps").startswith("a.csv: 3 rows lack")
+    assert "gaps: a.csv: 3 rows lack a number and are skipped" in result.warnings
     assert result.value == pytest.approx(evaluate([replace(curve, lost=0)], (0.12, 0.24)).value, rel=1e-9)
     for low, high in ((0.07, 0.30), (0.13, 0.20)):
         gone = np.where((low < STRAIN) & (high > STRAIN), np.nan, STRESS)
@@ -194,15 +199,15 @@ def test_specimens_that_are_not_one_silicone_s_are_refused_and_an_odd_one_is_nam
     with pytest.raises(UnitcadError, match=r"factor of 10 .*not specimens of one silicone"):
         evaluate([made(1.0), made(10.0)], (0.12, 0.24))
     odd = evaluate([made(1.0), made(1.5)], (0.12, 0.24))
-    assert "scatter" in {one.code for one in odd.warnings}
-    assert "scatter" not in {one.code for one in evaluate([made(1.0), made(1.1)], (0.12, 0.24)).warnings}
+    assert "scatter" in codes(odd)
+    assert "scatter" not in codes(evaluate([made(1.0), made(1.1)], (0.12, 0.24)))
 
 
 def test_one_specimen_counts_once(tmp_path):
     path = _pull(tmp_path / "a.csv", STRAIN, STRESS)
     copy = tmp_path / "b.csv"
     copy.write_bytes(path.read_bytes())
-    for second, part in ((path, "given twice"), (tmp_path / "." / "a.csv", "given twice"), (copy, "same content")):
+    for second, part in ((path, "content as a.csv"), (copy, "content as a.csv")):
         assert part in refused("", path, second, "--like", "ecoflex-00-30", "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -248,7 +253,7 @@ def test_the_range_covers_methods_specimens_and_cross_section(tmp_path):
     assert result.high == pytest.approx(at_10 * widened, rel=1e-3)
     at_100 = YOUNG / 3 * (2 - 1 / 4) * mean
     assert result.low == pytest.approx(at_100 / widened, rel=1e-3)
-    assert "specimens" not in {one.code for one in result.warnings}
+    assert "specimens" not in codes(result)
 
 
 def test_cycles_count_by_their_first_pull(tmp_path):
@@ -257,7 +262,7 @@ def test_cycles_count_by_their_first_pull(tmp_path):
     back = np.concatenate([stress[:200], 0.7 * stress[199:0:-1], 0.7 * stress[:200], stress[200:]])
     curve = read_curve(_pull(tmp_path / "a.csv", there, back), {}, Specimen())
     assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
-    assert "cycles" in {one.code for one in evaluate([curve], (0.12, 0.24)).warnings}
+    assert "cycles" in codes(evaluate([curve], (0.12, 0.24)))
 
 
 def refused(field, *words):
@@ -359,7 +364,7 @@ def test_an_exact_law_is_recovered_and_extrapolated(tmp_path):
     geometry, decades = 0.05, math.log10(125 / 20)  # what an exact fit can't know
     assert result.error == pytest.approx(math.hypot(geometry, 0.1 * decades), rel=1e-2)
     assert result.loss_error == pytest.approx(0.1 * decades, rel=1e-2)
-    assert {one.code for one in result.warnings} == {"specimens"}
+    assert codes(result) == {"specimens"}
 
 
 def test_storage_and_loss_swapped_are_refused(tmp_path):
@@ -403,7 +408,6 @@ def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path):
     )
     assert json.loads(done.stdout)["dynamic"]["extrapolated"] is True
     assert "extrapolated from" in entry["youngs_modulus_kpa"]["source"]
-    ET.parse(tmp_path / "out" / "dynamic.svg")
 
 
 @pytest.mark.parametrize("option", ["--gauge-mm"])
@@ -418,7 +422,7 @@ def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack):
     toe = fit_start(strain, bar, 0.24)
     assert toe.origin == pytest.approx(slack, abs=1e-6)
     exact = np.mean([YOUNG / 3 * (s**2 + s + 1) / s**2 for s in np.linspace(1.12, 1.24, 1001)])
-    assert moduli(strain, bar, 0.12, 0.24, toe)[0].value == pytest.approx(exact, rel=1e-4)
+    assert moduli(strain, bar, 0.12, 0.24, toe)[0][1] == pytest.approx(exact, rel=1e-4)
     plain = secant(strain, bar, 0.15)
     assert (abs(plain / exact - 1) > 0.1) == (slack != 0)
 
@@ -465,6 +469,5 @@ def test_the_shipped_values_are_those_of_the_curves(results):
 
 
 def test_the_warnings_name_what_is_doubtful(results):
-    codes = {name: {one.code for one in result.warnings} for name, result in results.items()}
-    assert codes["ecoflex-00-10"] == {"start", "toe", "crosshead", "specimens"}
-    assert "toe" not in codes["dragon-skin-30"]
+    assert codes(results["ecoflex-00-10"]) == {"start", "toe", "crosshead", "specimens"}
+    assert "toe" not in codes(results["dragon-skin-30"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -38,12 +37,8 @@ _BARE = ("tan_delta",)
 """Quantities that may lack a unit; a strain may not, since a percentage looks like a ratio."""
 
 
-@dataclass(frozen=True)
-class Declared:
-    """A declared quantity: its column (a name, or a number from 1) and its unit, "" for the file's."""
-
-    column: str | int
-    unit: str = ""
+Declared = tuple[str | int, str]
+"""The column of a declared quantity (a name, or a number from 1) and its unit, "" for the file's."""
 
 
 def parse_column(texts: Iterable[str]) -> dict[str, Declared]:
@@ -57,12 +52,10 @@ def parse_column(texts: Iterable[str]) -> dict[str, Declared]:
             )
         if quantity not in COLUMN_UNITS:
             raise unknown_name("--column", quantity, COLUMN_UNITS)
-        column, colon, unit = rest.rpartition(":")
-        if not colon:
-            column, unit = rest, ""
-        elif _unit(unit, quantity) is None:
+        column, colon, unit = rest.rpartition(":") if ":" in rest else (rest, "", "")
+        if colon and _unit(unit, quantity) is None:
             raise unknown_name("--column", unit, COLUMN_UNITS[quantity])
-        found[quantity] = Declared(int(column) if column.isdecimal() else column, unit)
+        found[quantity] = int(column) if column.isdecimal() else column, unit
     return found
 
 
@@ -72,8 +65,10 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
     Raises Refusal if several columns fit, and for a unit that is missing or of another quantity.
     """
     channels = recording.channels
+    unit = ""
     if quantity in given:
-        at = recording.index(given[quantity].column, "--column")
+        column, unit = given[quantity]
+        at = recording.index(column, "--column")
     else:
         fitting = [
             i for i, c in enumerate(channels) if re.fullmatch(_COLUMN_NAMES[quantity], c.name.strip(), re.IGNORECASE)
@@ -85,7 +80,6 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
             limit = f"{recording.path.name} has several columns for {quantity}: {names}; declare {quantity}=COLUMN:UNIT"
             raise Refusal("--column", None, limit)
         at = fitting[0]
-    unit = given[quantity].unit if quantity in given else ""
     unit = unit or channels[at].unit
     factor = _unit(unit, quantity) if unit else 1.0 if quantity in _BARE else None
     if factor is None:
@@ -154,6 +148,13 @@ class Specimen:
         return replace(other, **given)
 
     @property
+    def area_error(self) -> float:
+        """Relative error of the cross-section."""
+        if self.width_mm is None or self.thickness_mm is None:
+            return AREA_ERROR
+        return math.hypot(CALLIPER_MM / self.width_mm, CALLIPER_MM / self.thickness_mm)
+
+    @property
     def area(self) -> float | None:
         """Cross-section, m2."""
         if self.width_mm is None or self.thickness_mm is None:
@@ -166,7 +167,7 @@ class TensileCurve:
     """One specimen's curve up to its largest stress: engineering strain rises, engineering stress in Pa; both (n,).
 
     `rate`: strain per second at the start, None without a time. `skipped`: points whose strain had been passed before;
-    `lost`: rows without a number. `sha256`: of the file; `path`: of the file.
+    `lost`: rows without a number. `sha256`: of the file.
     """
 
     name: str
@@ -177,7 +178,6 @@ class TensileCurve:
     rate: float | None = None
     skipped: int = 0
     lost: int = 0
-    path: Path | None = field(default=None, repr=False)
 
 
 def read_curve(
@@ -217,65 +217,47 @@ def read_curve(
         raise UnitcadError(f"{path}: {len(strain)} points before the largest stress; a curve needs {LEAST_POINTS}")
     if strain[0] <= -1.0:
         raise UnitcadError(f"{path}: the strain begins at {strain[0]:.3g}: strain cannot be below -1")
-    return TensileCurve(path.name, strain, stress, specimen, files.sha256(path), rate, int((~fresh).sum()), lost, path)
+    return TensileCurve(path.name, strain, stress, specimen, files.sha256(path), rate, int((~fresh).sum()), lost)
 
 
 def header_of(path: Path) -> Specimen:
     """Return the specimen from the lines "name;value" before the numbers."""
-    found: dict[str, float | bool] = {}
-    for name, value in _pairs(path):
-        number = _NUMBER.match(value)
-        for pattern, key in _HEADER:
-            if not number or not re.search(pattern, name, re.IGNORECASE):
-                continue
-            amount = float(number[1].replace(",", "."))
-            if amount > 0 and not _MAYBE_THOUSANDS.fullmatch(number[1]):
-                found.setdefault(key, amount)
-        if re.search("strain|elongation", name, re.IGNORECASE):
-            if re.search("crosshead|cross-head|grip|traverse", value, re.IGNORECASE):
-                found["crosshead"] = True
-            elif re.search("extensometer|video|dic", value, re.IGNORECASE):
-                found["crosshead"] = False
-    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length if no other line gives one
-        found.setdefault("gauge_mm", length)
-    return Specimen(**found)  # type: ignore[arg-type]
-
-
-_HEADER = (
-    (r"thickness\s*[\[(]mm[\])]", "thickness_mm"),
-    (r"width\s*[\[(]mm[\])]", "width_mm"),
-    (r"(?:specimen|gauge|initial) length\s*[\[(]mm[\])]", "gauge_mm"),
-    (r"^\s*length\s*[\[(]mm[\])]", "length_mm"),
-)
-
-
-_NUMBER = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:e-?\d+)?)")
-_MAYBE_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
-_UNIT = re.compile(r"\s*[\[(]?(mm)[\])]?\s*")
-
-
-def _pairs(path: Path) -> Iterator[tuple[str, str]]:
-    """Yield name and value of the header's lines; a third cell with a unit counts to the name."""
     with open(path, "rb", opener=files.regular()) as file:
         text = file.read(100_000).decode("utf-8", "replace")
+    found: dict[str, float | bool] = {}
     for line in text.splitlines()[:_HEADER_LINES]:
-        cells = [cell.strip(" \"'") for cell in _cells(line)]
-        if len(cells) > 1 and cells[0] and not re.match(r"[\d.+-]", cells[0]):
-            unit = _UNIT.fullmatch(cells[2]) if len(cells) > 2 else None
-            yield (f"{cells[0]} ({unit[1]})" if unit else cells[0]), cells[1]
+        for key, pattern in _LENGTHS.items():
+            size = pattern.match(line)
+            if size is None or not (size["mm"] or size["unit"]):
+                continue
+            number = size["number"].rstrip(",")
+            two_cells = "," in number and size["sign"] == "," and not size["quote"]  # 6,5: one or two?
+            if _NUMBER.fullmatch(number) and not two_cells and not _MAYBE_THOUSANDS.fullmatch(number):
+                found.setdefault(key, float(number.replace(",", ".")))
+        if how := _STRAIN.match(line):
+            found["crosshead"] = how[1] is not None
+    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length if no other line gives one
+        found.setdefault("gauge_mm", length)
+    return Specimen(**{key: value for key, value in found.items() if key == "crosshead" or value})  # type: ignore[arg-type]
 
 
-def _cells(line: str) -> list[str]:
-    """Return a header line's cells: at semicolons or tabs, else at a colon, else at commas that no quotes enclose."""
-    if ";" in line or "\t" in line:
-        return re.split(r"[;\t]", line)
-    if '"' not in line and re.search(r":\s", line):
-        return re.split(r":\s", line, maxsplit=1)
-    try:
-        cells = next(csv.reader([line], strict=True, skipinitialspace=True), [])
-    except csv.Error:
-        return []
-    return [] if '"' not in line and re.fullmatch(r"\s*\d+\s*", "".join(cells[2:3])) else cells  # 6,5: one or two?
+_CELL = r"""\s*(?P<mm>[\[(]mm[\])])?["']?\s*(?P<sign>[;:,\t])\s*(?P<quote>["']?)(?P<number>\d[\d.,e-]*)["']?"""
+_LENGTHS = {
+    key: re.compile(rf"""\W*{name}{_CELL}[;,\t\s]*["'\[(]*(?P<unit>mm\b)?""", re.IGNORECASE)
+    for key, name in (
+        ("thickness_mm", r"[\w -]*thickness"),
+        ("width_mm", r"[\w -]*width"),
+        ("gauge_mm", r"[\w -]*(?:specimen|gauge|initial) length"),
+        ("length_mm", "length"),
+    )
+}
+"""A length's name, a delimiter and a number, with mm in one of three places."""
+_STRAIN = re.compile(
+    r"[^;,:\t]*(?:strain|elongation)[^;,:\t]*[;,:\t][^;,\t]*?(?:(crosshead|cross-head|grip|traverse)|extensometer|video|dic\b)",
+    re.IGNORECASE,
+)
+_NUMBER = re.compile(r"\d+(?:[.,]\d*)?(?:e-?\d+)?")
+_MAYBE_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
 
 
 SECANTS = (0.10, 0.15, 0.25, 0.50, 1.00)
@@ -286,13 +268,13 @@ _GRID = 41
 _PASSES = 3
 
 
-@dataclass(frozen=True)
-class Modulus:
-    """One method's Young's modulus of one curve, Pa; None with the reason if the method can't be used."""
+Modulus = tuple[str, float | None, str]
+"""A method, its Young's modulus of one curve in Pa, and the reason if the method can't be used: the modulus is None."""
 
-    method: str
-    value: float | None
-    reason: str = ""
+
+def _neo_hooke(stretch: np.ndarray) -> np.ndarray:
+    """Return the nominal stress over Young's modulus at stretches."""
+    return (stretch - stretch**-2) / 3.0
 
 
 @dataclass(frozen=True)
@@ -308,13 +290,12 @@ class Toe:
 
     def stress(self, strain: np.ndarray) -> np.ndarray:
         """Return the fitted nominal stress (Pa) at engineering strains as recorded."""
-        stretch = 1.0 + np.asarray(strain, float) - self.origin
-        return self.youngs_modulus / 3.0 * (stretch - stretch**-2)
+        return self.youngs_modulus * _neo_hooke(1.0 + strain - self.origin)
 
     def secant(self, low: float, high: float) -> float:
         """Return the mean secant modulus (Pa) between two strains, from the fitted origin."""
         stretch = 1.0 + np.linspace(low, high, _GRID)
-        return float(np.mean(self.youngs_modulus / 3.0 * (stretch - stretch**-2) / (stretch - 1.0)))
+        return float(np.mean(self.youngs_modulus * _neo_hooke(stretch) / (stretch - 1.0)))
 
 
 def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None:
@@ -333,8 +314,7 @@ def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None
             return toe
 
         def misfit(p: np.ndarray, x: np.ndarray = x, y: np.ndarray = y / slope) -> np.ndarray:
-            stretch = 1.0 + x - p[1]
-            return p[0] / 3.0 * (stretch - stretch**-2) - y
+            return p[0] * _neo_hooke(1.0 + x - p[1]) - y
 
         start, bounds = [1.0, -offset / slope], ([1e-6, -0.5], [1e3, float(x.max())])
         found = least_squares(misfit, start, bounds=bounds, xtol=1e-14, ftol=1e-14)
@@ -353,37 +333,35 @@ def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
     return float(np.interp(at, strain, stress)) / at
 
 
-def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float, toe: Toe | None) -> tuple[Modulus, ...]:
+def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float, toe: Toe | None) -> list[Modulus]:
     """Return Young's modulus by every method, the default first; strain rises, stress in Pa, use is `low` to `high`."""
-    made = []
-    ends = f"the curve ends at {100 * strain[-1]:.3g} %"
-    name = f"secant over {100 * low:.3g} to {100 * high:.3g} %, toe fitted"
+    value, reason = None, ""
     if strain[-1] < high:
-        made.append(Modulus(name, None, ends))
+        reason = f"the curve ends at {100 * strain[-1]:.3g} %"
     elif toe is None:
-        made.append(Modulus(name, None, f"too few points below {100 * high:.3g} %, or no rising stress there"))
+        reason = f"too few points below {100 * high:.3g} %, or no rising stress there"
     else:
         points = strain - toe.origin
         points = np.concatenate([[low], points[(points > low) & (points < high)], [high]])
         gap = int(np.argmax(np.diff(points)))
         begin, end = points[gap : gap + 2]
-        span = f"{100 * (begin + toe.origin):.3g} and {100 * (end + toe.origin):.3g} %"
-        sparse = end - begin > WIDEST_GAP * (high - low)
-        reason = f"the curve has no point between {span} strain" if sparse else ""
-        made.append(Modulus(name, None if sparse else toe.secant(low, high), reason))
+        if end - begin > WIDEST_GAP * (high - low):
+            span = f"{100 * (begin + toe.origin):.3g} and {100 * (end + toe.origin):.3g} %"
+            reason = f"the curve has no point between {span} strain"
+        else:
+            value = toe.secant(low, high)
+    found: list[Modulus] = [(f"secant over {100 * low:.3g} to {100 * high:.3g} %, toe fitted", value, reason)]
     for at in SECANTS:
-        standard = " (ISO 37, ASTM D412)" if at == 1.0 else ""
         value, reason = secant(strain, stress, at), ""
         if value is None:
             spanned = f"the curve spans {100 * strain[0]:.3g} to {100 * strain[-1]:.3g} %"
             reason = "no points near it" if strain[0] <= at <= strain[-1] else spanned
-        made.append(Modulus(f"secant at {100 * at:g} %{standard}", value, reason))
-    name, kept = f"slope 0 to {100 * SLOPE_TO:g} % with offset", strain <= SLOPE_TO
-    if kept.sum() < 3 or strain[-1] < SLOPE_TO:
-        made.append(Modulus(name, None, "fewer than three points, or the curve ends before"))
-    else:
-        made.append(Modulus(name, float(np.polyfit(strain[kept], stress[kept], 1)[0])))
-    return tuple(made)
+        found.append((f"secant at {100 * at:g} %{' (ISO 37, ASTM D412)' if at == 1.0 else ''}", value, reason))
+    kept = strain <= SLOPE_TO
+    value, reason = None, "fewer than three points, or the curve ends before"
+    if kept.sum() >= 3 and strain[-1] >= SLOPE_TO:
+        value, reason = float(np.polyfit(strain[kept], stress[kept], 1)[0]), ""
+    return [*found, (f"slope 0 to {100 * SLOPE_TO:g} % with offset", value, reason)]
 
 
 CALLIPER_MM = 0.05
@@ -408,19 +386,11 @@ class MethodRow:
 
 
 @dataclass(frozen=True)
-class Warned:
-    """One warning: a word that names it, and a sentence."""
-
-    code: str
-    message: str
-
-
-@dataclass(frozen=True)
 class TensileResult:
     """The modulus (Pa) at the strain of use, its range, every method, and the parts of the uncertainty.
 
     `scatter`, `geometry`: half-widths of the logarithm; scatter is None for one specimen. `spread`: the largest over
-    the least defensible value. `rate`: strain per second, None if not known.
+    the least defensible value. `rate`: strain per second, None if not known. `warnings`: each begins with its name.
     """
 
     value: float
@@ -435,7 +405,7 @@ class TensileResult:
     spread: float
     used: tuple[float, float]
     rate: float | None
-    warnings: tuple[Warned, ...]
+    warnings: tuple[str, ...]
 
 
 def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: Material | None = None) -> TensileResult:
@@ -447,8 +417,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     known: dict[str, TensileCurve] = {}
     for curve in curves:
         if before := known.get(curve.sha256):
-            limit = "is given twice" if before.path == curve.path else f"has the same content as {before.name}"
-            raise Refusal("FILES", curve.name, f"{limit}: one specimen counts once")
+            raise Refusal("FILES", curve.name, f"has the same content as {before.name}: one specimen counts once")
         known[curve.sha256] = curve
     toes = tuple(fit_start(curve.strain, curve.stress, used[1]) for curve in curves)
     by_curve = (moduli(curve.strain, curve.stress, *used, toe) for curve, toe in zip(curves, toes, strict=True))
@@ -469,22 +438,20 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     if len(by_specimen) > 1:
         count = len(by_specimen)
         scatter = float(t.ppf(0.975, count - 1) * np.std(np.log(by_specimen), ddof=1) / math.sqrt(count))
-    geometry = max(_area_error(curve.specimen) for curve in curves)
+    geometry = max(curve.specimen.area_error for curve in curves)
     widened = math.exp(math.hypot(scatter or 0.0, geometry))
     rates = [curve.rate for curve in curves if curve.rate]
     values = [row.value for row in rows if row.value is not None and row.defensible]
-    warnings = []
-    for curve, toe in zip(curves, toes, strict=True):
-        warnings += [Warned(code, f"{curve.name}: {message}") for code, message in _doubts(curve, toe)]
+    warnings = [doubt for curve, toe in zip(curves, toes, strict=True) for doubt in _doubts(curve, toe)]
     if len(curves) == 1:
-        warnings.append(Warned("specimens", "one curve: the scatter of specimens is not in the range"))
+        warnings.append("specimens: one curve: the scatter of specimens is not in the range")
     if ratio > MOST_SCATTER:
-        warnings.append(Warned("scatter", f"the specimens differ by a factor of {ratio:.3g}: look for an odd one"))
+        warnings.append(f"scatter: the specimens differ by a factor of {ratio:.3g}: look for an odd one")
     if sheet:
         off = chosen.value / 1e3 / float(sheet.modulus_100pct_kpa)
         if not 1 / MOST_OF_SHEET <= off <= MOST_OF_SHEET:
-            message = f"{off:.3g} times the 100 % modulus of {sheet.name}, {float(sheet.modulus_100pct_kpa):g} kPa"
-            warnings.append(Warned("sheet", f"{message}: check the units and --like"))
+            of = f"the 100 % modulus of {sheet.name}, {float(sheet.modulus_100pct_kpa):g} kPa"
+            warnings.append(f"sheet: {off:.3g} times {of}: check the units and --like")
     return TensileResult(
         chosen.value, min(values) / widened, max(values) * widened, chosen.method, rows, toes, tuple(curves),
         scatter, geometry, max(values) / min(values), used, float(np.median(rates)) if rates else None, tuple(warnings),
@@ -504,37 +471,30 @@ def quasistatic(result: TensileResult, frequency_hz: float) -> str:
 
 
 def _row(methods: Sequence[Modulus]) -> MethodRow:
-    values = tuple(one.value for one in methods)
-    known = [v for v in values if v is not None]
-    positive = [v for v in known if v > 0]
+    values = tuple(value for _, value, _ in methods)
+    known = [value for value in values if value is not None]
+    defensible = len(known) == len(values) and min(known) > 0
     mean = None
-    if known and len(known) == len(values):
-        mean = (
-            math.exp(sum(map(math.log, known)) / len(known)) if len(positive) == len(known) else sum(known) / len(known)
-        )
-    reasons = list(dict.fromkeys(one.reason for one in methods if one.reason))
-    defensible = len(positive) == len(values)
-    return MethodRow(methods[0].method, mean, values, defensible, "; ".join(reasons[:2]))
+    if len(known) == len(values):
+        mean = math.exp(sum(map(math.log, known)) / len(known)) if defensible else sum(known) / len(known)
+    reasons = list(dict.fromkeys(reason for _, _, reason in methods if reason))
+    return MethodRow(methods[0][0], mean, values, defensible, "; ".join(reasons[:2]))
 
 
-def _area_error(specimen: Specimen) -> float:
-    if specimen.width_mm is None or specimen.thickness_mm is None:
-        return AREA_ERROR
-    return math.hypot(CALLIPER_MM / specimen.width_mm, CALLIPER_MM / specimen.thickness_mm)
-
-
-def _doubts(curve: TensileCurve, toe: Toe | None) -> Iterator[tuple[str, str]]:
-    """Yield the doubts about one curve: a word that names each, and a message."""
+def _doubts(curve: TensileCurve, toe: Toe | None) -> Iterator[str]:
+    """Yield the warnings about one curve."""
+    name = curve.name
     if curve.strain[0] > LATEST_START:
-        yield "start", f"the first point is at {100 * curve.strain[0]:.3g} % strain"
+        yield f"start: {name}: the first point is at {100 * curve.strain[0]:.3g} % strain"
     if toe and abs(toe.origin) > MOST_TOE:
-        yield "toe", f"the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
+        yield f"toe: {name}: the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
     if curve.lost:
-        yield "gaps", f"{curve.lost} rows lack a number and are skipped"
+        yield f"gaps: {name}: {curve.lost} rows lack a number and are skipped"
     if curve.skipped > 0.01 * len(curve.strain):
-        yield "cycles", f"{curve.skipped} points skipped: the strain goes back, as in cycles; the first pull counts"
+        skipped = f"{curve.skipped} points skipped: the strain goes back, as in cycles; the first pull counts"
+        yield f"cycles: {name}: {skipped}"
     if curve.specimen.crosshead:
-        yield "crosshead", "strain by the crosshead's travel: grips and shoulders count as gauge length"
+        yield f"crosshead: {name}: strain by the crosshead's travel: grips and shoulders count as gauge length"
 
 
 Deformation = Literal["shear", "tension"]
@@ -586,7 +546,7 @@ class DynamicResult:
     held_out_error: float | None
     extrapolated: bool
     curve: DynamicCurve
-    warnings: tuple[Warned, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def read_dynamic(
@@ -649,19 +609,19 @@ def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: fl
         if held_out is not None:
             grown = max(grown, held_out * max(1.0, beyond / span))
         error, loss_error = math.hypot(error, grown), math.hypot(loss_error, grown)
-    said = {"specimens": "one dynamic test: the scatter of specimens is not in the range"}
+    name = curve.name
+    warnings = [f"specimens: {name}: one dynamic test: the scatter of specimens is not in the range"]
     if residual > MOST_MISFIT:
-        said["misfit"] = f"the law misses the points by {100 * residual:.2g} % (rms of the logarithms)"
+        warnings.append(f"misfit: {name}: the law misses the points by {100 * residual:.2g} % (rms of the logarithms)")
     if over:
-        said["loss"] = (
-            "the loss is above the storage modulus, which a cured silicone's is not; are the columns swapped?"
-        )
+        hint = "the loss is above the storage modulus, which a cured silicone's is not; are the columns swapped?"
+        warnings.append(f"loss: {name}: {hint}")
     if curve.lost:
-        said["gaps"] = f"{curve.lost} rows lack a number and are skipped"
+        warnings.append(f"gaps: {name}: {curve.lost} rows lack a number and are skipped")
     static, tau, n = _constants(constants)
     return DynamicResult(
         static, tau, n, residual, frequency_hz, float(storage_at), float(loss_at / storage_at), error, loss_error,
-        fit_error, held_out, outside, curve, tuple(Warned(code, f"{curve.name}: {one}") for code, one in said.items()),
+        fit_error, held_out, outside, curve, tuple(warnings),
     )  # fmt: skip
 
 

@@ -1,10 +1,9 @@
-"""unitcad material: the table for a spec, everything as JSON, a chart of curves and fits."""
+"""unitcad material: the table for a spec, everything as JSON, a chart of the tensile curves."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,11 +12,10 @@ import typer
 
 from unitcad import catalogue, files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.layered import FractionalKelvinVoigt
-from unitcad.catalogue import Material, MaterialEntry, materials
+from unitcad.catalogue import Material, MaterialEntry, choose, materials
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
 from unitcad.lab.material import (
     DynamicResult,
@@ -75,48 +73,35 @@ def as_data(
 ) -> dict[str, Any]:
     """Return everything as JSON-ready data; moduli in kPa, strains as fractions."""
     found: dict[str, Any] = {"material": name, "table": dict(entry)}
-
-    def kpa(value: float | None) -> float | None:
-        return None if value is None else value / 1e3
-
-    def warnings(result: TensileResult | DynamicResult) -> list[dict[str, str]]:
-        return [asdict(one) for one in result.warnings]
-
     if tensile:
         found["tensile"] = {
             "quasistatic": quasistatic(tensile, hertz),
-            "value_kpa": kpa(tensile.value), "low_kpa": kpa(tensile.low), "high_kpa": kpa(tensile.high),
-            "method": tensile.method,
-            "strain_of_use": tensile.used,
-            "uncertainty": {
-                "methods_factor": tensile.spread, "scatter_of_specimens": tensile.scatter,
-                "cross_section": tensile.geometry,
-            },
+            "methods_factor": tensile.spread, "scatter_of_specimens": tensile.scatter,
+            "cross_section": tensile.geometry,
             "methods": [
                 {
-                    "method": row.method, "value_kpa": kpa(row.value),
-                    "by_specimen_kpa": list(map(kpa, row.by_specimen)),
+                    "method": row.method, "value_kpa": _kpa(row.value),
+                    "by_specimen_kpa": list(map(_kpa, row.by_specimen)),
                     "defensible": row.defensible, "reason": row.reason,
                 }
                 for row in tensile.rows
             ],
-            "warnings": warnings(tensile),
+            "warnings": list(tensile.warnings),
             "files": [{"name": curve.name, "sha256": curve.sha256} for curve in tensile.curves],
         }  # fmt: skip
     if dynamic:
-        curve = dynamic.curve
         found["dynamic"] = {
-            "law": "E0 (1 + (i w tau)^n)",
-            "static_kpa": kpa(dynamic.static), "tau_s": dynamic.tau, "n": dynamic.n, "residual": dynamic.residual,
-            "measured_hz": [float(curve.frequency[0]), float(curve.frequency[-1])],
-            "frequency_hz": dynamic.frequency_hz,
-            "storage_kpa": kpa(dynamic.storage), "loss_factor": dynamic.loss_factor,
+            "law": "E0 (1 + (i w tau)^n)", "residual": dynamic.residual,
             "error": dynamic.error, "loss_factor_error": dynamic.loss_error, "fit_error": dynamic.fit_error,
             "extrapolated": dynamic.extrapolated, "upper_half_predicted_error": dynamic.held_out_error,
-            "warnings": warnings(dynamic),
-            "files": [{"name": curve.name, "sha256": curve.sha256}],
+            "warnings": list(dynamic.warnings),
+            "files": [{"name": dynamic.curve.name, "sha256": dynamic.curve.sha256}],
         }  # fmt: skip
     return rounded(found, 6)
+
+
+def _kpa(pascals: float | None) -> float | None:
+    return None if pascals is None else pascals / 1e3
 
 
 def tensile_chart(name: str, result: TensileResult) -> str:
@@ -131,26 +116,6 @@ def tensile_chart(name: str, result: TensileResult) -> str:
     low, high = (100 * end for end in result.used)
     title = f"{name}: nominal stress, quasi-static; shaded: the strain of use"
     return chart(series, title, "engineering strain, %", "nominal stress, kPa", shaded=(low, high))
-
-
-def dynamic_chart(name: str, result: DynamicResult, factor: float) -> str:
-    """Draw storage and loss with the law, on to the motor's frequency; `factor` makes shear moduli Young's."""
-
-    curve, law = result.curve, FractionalKelvinVoigt(result.tau, result.n)
-    ends = min(curve.frequency[0], result.frequency_hz), max(curve.frequency[-1], result.frequency_hz)
-    hertz = np.geomspace(*ends, 120)
-    modulus = [law.complex_shear(result.static, 2 * np.pi * float(one)) for one in hertz]
-    series = [
-        Series("storage", curve.frequency, factor * curve.storage / 1e3, points=True),
-        Series("loss", curve.frequency, factor * curve.loss / 1e3, points=True),
-        Series("storage, fractional Kelvin-Voigt", hertz, [one.real / 1e3 for one in modulus]),
-        Series("loss, fractional Kelvin-Voigt", hertz, [one.imag / 1e3 for one in modulus]),
-    ]
-    title = f"{name}: Young's modulus over frequency{'; shaded: extrapolated' if result.extrapolated else ''}"
-    nearest = curve.frequency[-1] if result.frequency_hz > curve.frequency[-1] else curve.frequency[0]
-    low, high = sorted((float(nearest), result.frequency_hz))
-    shaded = (low, high) if result.extrapolated else None
-    return chart(series, title, "frequency, Hz", "modulus, kPa", log_x=True, log_y=True, shaded=shaded)
 
 
 def _dynamic(result: DynamicResult) -> dict[str, Any]:
@@ -233,7 +198,7 @@ def material(
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", metavar="DIR", help="Folder for material.toml, .json and charts. Default: only print."
+            "-o", "--out", metavar="DIR", help="Folder for material.toml, .json and tensile.svg. Default: only print."
         ),
     ] = None,
     as_json: AsJson = False,
@@ -249,7 +214,8 @@ def material(
         raise Refusal("FILES", None, "is required: a tensile curve or more, or --dma with a file")
     if deformation and dma is None:
         raise Refusal("--deformation", deformation, "says how --dma was measured, which is not given")
-    for path in [*(curves or []), *([dma] if dma else [])]:
+    paths = [*(curves or []), *([dma] if dma else [])]
+    for path in paths:
         if not path.exists():
             raise files.NotThere(path)
         if path.suffix == ".toml":
@@ -268,14 +234,18 @@ def material(
             stage(dma.name)
             moduli = read_dynamic(dma, given, deformation, layout)
         shipped = catalogue.materials()
-        named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
-        base = _base(like, named, shipped)
-        tensile = evaluate(read, used, shipped[base]) if read else None
-        ratio = float(shipped[base].poisson_ratio)
+        words = "".join(letter if letter.isalnum() else " " for letter in paths[0].stem.lower()).split()
+        named = name or "-".join(words) or "material"
+        if not like and named not in shipped:
+            limit = f"is required: {named!r} is no shipped silicone, and a curve gives only a modulus"
+            raise Refusal("--like", None, f"{limit}; known: {', '.join(shipped)}")
+        base = choose("--like", like or named, shipped)
+        tensile = evaluate(read, used, base) if read else None
+        ratio = float(base.poisson_ratio)
         dynamic = evaluate_dynamic(moduli, frequency_hz, ratio) if moduli else None
-    entry = entry_of(tensile, dynamic, base, frequency_hz)
+    entry = entry_of(tensile, dynamic, base.name, frequency_hz)
     expect_loadable(named, entry)
-    text = material_toml(named, entry, _comments(entry, shipped[base]))
+    text = material_toml(named, entry, _comments(entry, base))
     found = as_data(named, entry, tensile, dynamic, frequency_hz)
     if out is not None:
         contents = {
@@ -284,9 +254,6 @@ def material(
         }
         if tensile:
             contents["tensile.svg"] = tensile_chart(named, tensile)
-        if dynamic:
-            factor = 2 * (1 + float(shipped[base].poisson_ratio)) if dynamic.curve.deformation == "shear" else 1.0
-            contents["dynamic.svg"] = dynamic_chart(named, dynamic, factor)
         files.replace_all(out, {key: one.encode() for key, one in contents.items()}, "material.toml")
     if as_json:
         print_json({**found, **({"folder": str(out)} if out is not None else {})})
@@ -300,17 +267,6 @@ def material(
         typer.echo(str(out))
 
 
-def _base(like: str, named: str, shipped: Mapping[str, Material]) -> str:
-    """Return the shipped silicone that gives the values that no test measures."""
-    if not like and named not in shipped:
-        limit = f"is required: {named!r} is no shipped silicone, and a curve gives only a modulus"
-        raise Refusal("--like", None, f"{limit}; known: {', '.join(shipped)}")
-    base = like or named
-    if base not in shipped:
-        raise unknown_name("--like", base, shipped)
-    return base
-
-
 def _comments(entry: dict[str, Any], base: Material) -> tuple[str, ...]:
     lines = ["For a spec: paste it there and name the silicone in [[layers]]."]
     if "quasistatic_modulus_kpa" in entry:
@@ -321,11 +277,6 @@ def _comments(entry: dict[str, Any], base: Material) -> tuple[str, ...]:
                 f"Without that the estimate uses the modulus of {base.name}: {base.youngs_modulus_kpa.value:g} kPa."
             )
     return tuple(lines)
-
-
-def _slug(path: Path) -> str:
-    words = "".join(letter if letter.isalnum() else " " for letter in path.stem.lower()).split()
-    return "-".join(words) or "material"
 
 
 def _strain(text: str) -> tuple[float, float]:
@@ -347,24 +298,17 @@ def _print_tensile(name: str, result: TensileResult, found: dict[str, Any]) -> N
     print_indented(found["quasistatic"])
     rows = []
     for row in result.rows:
-        each = " ".join(map(_kilopascals, row.by_specimen[:8])) if len(row.by_specimen) > 1 else ""
-        cells = {"method": row.method, "kPa": _kilopascals(row.value), "by specimen": each, "remark": row.reason}
-        rows.append(cells)
+        value, *each = ("-" if one is None else f"{one / 1e3:.4g}" for one in (row.value, *row.by_specimen[:8]))
+        by_specimen = " ".join(each) if len(row.by_specimen) > 1 else ""
+        rows.append({"method": row.method, "kPa": value, "by specimen": by_specimen, "remark": row.reason})
     print_table(rows)
+    scatter = "not known" if result.scatter is None else f"+- {100 * result.scatter:.2g} %"
     print_indented(
         f"range: the methods that could be defended differ by {result.spread:.3g}; "
-        f"specimens {_percent(result.scatter)}, cross-section {_percent(result.geometry)}"
+        f"specimens {scatter}, cross-section +- {100 * result.geometry:.2g} %"
     )
     for one in result.warnings:
-        warn(f"warning: {one.code}: {one.message}")
-
-
-def _kilopascals(modulus: float | None) -> str:
-    return "-" if modulus is None else f"{modulus / 1e3:.4g}"
-
-
-def _percent(half_width: float | None) -> str:
-    return "not known" if half_width is None else f"+- {100 * half_width:.2g} %"
+        warn(f"warning: {one}")
 
 
 def _print_dynamic(result: DynamicResult) -> None:
@@ -387,4 +331,4 @@ def _print_dynamic(result: DynamicResult) -> None:
         low, high = result.curve.frequency[0], result.curve.frequency[-1]
         warn(f"warning: extrapolated: measured from {low:g} to {high:g} Hz; {tested}")
     for one in result.warnings:
-        warn(f"warning: {one.code}: {one.message}")
+        warn(f"warning: {one}")
