@@ -59,11 +59,6 @@ class Wiring:
         """Rows and spine."""
         return self.rows + self.spine
 
-    @property
-    def end(self) -> Point:
-        """The middle of the tail's end."""
-        return self.spine[-1].end
-
 
 def wiring(array: Array) -> Wiring:
     """Return the common circuit of an array's motors.
@@ -478,7 +473,8 @@ def pad_table(array: Array, laid: Wiring) -> bytes:
     for place in array.places:
         motor = motor_of(place.unit)
         add(place.name, "pad", (place.x, place.y), 2 * laid.pad.radius, place.unit.name, motor.name if motor else "")
-    add("tail", "end of the tail", laid.end, 2 * laid.spine[-1].half, "", "")
+    tail = laid.spine[-1]
+    add("tail", "end of the tail", tail.end, 2 * tail.half, "", "")
     return text.getvalue().encode()
 
 
