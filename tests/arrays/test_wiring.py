@@ -34,7 +34,7 @@ def test_nine_units_have_three_rows_and_a_spine_between_two_columns():
 
 
 def test_a_spine_is_laid_where_it_is_asked_for():
-    assert wiring(nine(circuit={"spine_mm": -10.0})).end[0] == -10
+    assert wiring(nine(circuit={"spine_mm": -10.0})).spine[-1].end[0] == -10
     turned = wiring(nine(circuit={"rows": "y", "spine_mm": 10.0, "tail_mm": 3.0}))
     assert turned.end == (nine().sheet.outline[0] - 3, 10)
     assert turned.rows[0].start[0] == turned.rows[0].end[0]
