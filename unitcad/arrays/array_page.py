@@ -331,12 +331,11 @@ def bent(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh of a cast solid around the limb: vertices (n, 3) in mm and faces (m, 3).
 
     x becomes the angle x over the middle's radius, z the distance from the limb's axis, which is y: the sheet's middle
-    keeps its length. The middle of the array is on top. A curved casting is so already. Raises ValueError for an
-    array that is worn flat.
+    keeps its length. The middle of the array is on top. A curved casting is so already.
     """
     radius, middle = array.radius_mm, array.middle_radius_mm
-    if radius is None or middle is None:
-        raise ValueError("the array is worn flat")
+    assert radius is not None  # an array that is worn flat has no such picture
+    assert middle is not None
     if array.cast == "curved":
         vertices, faces = arrays(solid)
         return np.asarray(vertices, float) + np.array([0.0, 0.0, radius]), np.asarray(faces, np.int64)

@@ -88,9 +88,7 @@ def _print_details(data: Mapping[str, Any]) -> None:
         print_table(rows, f"sum of all other units there, times one unit's edge level: {_HOW}")
     if 1 < len(names) <= _MOST_PAIRS:
         shares = [["-" if value is None else number(100 * value, 2) for value in row] for row in matrix]
-        rows = [
-            dict(zip(("drives", *names), (name, *row), strict=True)) for name, row in zip(names, shares, strict=True)
-        ]
+        rows = [{"drives": name, **dict(zip(names, row, strict=True))} for name, row in zip(names, shares, strict=True)]
         print_table(rows, "% of a unit's motion at its edge that reaches the middle of another")
     ranges = f"In brackets: {data['range']}."
     print_indented(ranges, *data["assumptions"], f"Distances are {data['distances']}.")
