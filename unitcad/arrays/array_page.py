@@ -374,23 +374,21 @@ def pictures(moulds: PatchMoulds) -> dict[str, Callable[[], bytes]]:
     def patch() -> Iterable[Surface]:
         return (_solid(moulds, body) for body in patch_bodies(moulds.array))
 
+    def worn() -> Iterable[Surface]:
+        yield Surface(*arrays(limb(moulds.array)), SKIN)
+        for body in patch_bodies(moulds.array):
+            yield Surface(*bent(moulds.array, moulds.mesh(body)), body.colour)
+
     apart = shown(ABOVE, lambda: (_solid(moulds, *moved) for moved in take_apart(moulds)))
     names = {"patch-skin-side": shown(SKIN_SIDE, patch), "patch-back": shown(BACK, patch), "tools": apart}
     if moulds.array.radius_mm is not None:
-        names["patch-bent"] = shown(ALONG, partial(_worn_bodies, moulds))
+        names["patch-bent"] = shown(ALONG, worn)
     names |= {f"pour{s.index}": shown(ABOVE, partial(_cut_open, moulds, s)) for s in moulds.plan.steps}
     return {f"pictures/{name}.png": picture for name, picture in names.items()}
 
 
 def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
     return Surface(*arrays(moulds.mesh(body).translate(by)), body.colour)
-
-
-def _worn_bodies(moulds: PatchMoulds) -> Iterator[Surface]:
-    array = moulds.array
-    yield Surface(*arrays(limb(array)), SKIN)
-    for body in patch_bodies(array):
-        yield Surface(*bent(array, moulds.mesh(body)), body.colour)
 
 
 def take_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:

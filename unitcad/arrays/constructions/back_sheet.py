@@ -217,7 +217,7 @@ def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") 
     label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
     base = base_piece(engrave(blanks[0], list(_base_letters(drawing, f"B{label}"))))
     base = replace(base, removal=DOWN) if any(sheets) else base
-    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
+    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, -spec.moulds.plate_mm) for cell in lay.cells])
     cups: list[Body] = []
     steps: list[Step] = []
     for pour, (blank, sheet) in enumerate(zip(blanks[1:], sheets, strict=True), 1):
@@ -285,18 +285,13 @@ def _engraving(spec: Spec, top: float) -> tuple[float, float]:
     return top - spec.moulds.engraving_depth_mm, top + BEYOND
 
 
-def _bottom(spec: Spec) -> float:
-    """Return z of the base's lower face: its plate has no plinth."""
-    return -spec.moulds.plate_mm
-
-
 def _base(drawing: Drawing) -> Shape:
     """Draw the base: plate, cores, fins and pins in one piece, with pry slots and the filaments' ways."""
     spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
-    plate = Extrude(outline(lay.plate, MARK), _bottom(spec), 0.0)
+    plate = Extrude(outline(lay.plate, MARK), -spec.moulds.plate_mm, 0.0)
     cores = [moved(core(dims), cell.x, cell.y) for cell in lay.cells]
     ridges = [fin.drawn(fin.reach, 0.0, -BEYOND, dims.core_height) for fin in drawing.fins]
-    ways = [filament.way(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells]
+    ways = [filament.way(spec, dims, lay, cell, -spec.moulds.plate_mm) for cell in lay.cells]
     # Drawn for a plate under a plinth.
     slots = [moved(pry_slot(spec, lay, side), z=-plate_top(spec)) for side in (1, -1)]
     slots += [slot.drawn(lay) for slot in drawing.pry if not slot.customary]

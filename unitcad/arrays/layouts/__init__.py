@@ -58,8 +58,6 @@ def needs(distance: float, pair: tuple[Point, Point]) -> str:
     return f"{one.name} and {other.name} are {there:.4g} mm apart and need {distance:.4g} mm"
 
 
-__all__ = ["LayoutKind", "Point", "layouts"]
-
 MOST_PLACES = 1024
 
 
