@@ -1,13 +1,14 @@
 """What an array warns of: too many motors for its circuit's width, a groove drawn less deep than asked for."""
 
 import json
+from dataclasses import replace
 from html import escape
 
 import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.array_page import write_array_page
-from unitcad.arrays.circuit import GAP_MM, TRACK_MM, crowded_tracks, width_needed
+from unitcad.arrays.circuit import GAP_MM, TRACK_MM, crowded_tracks
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
@@ -21,7 +22,9 @@ def test_144_motors_need_a_tail_of_29_mm():
     assert "144 tracks" in said
     assert f"need {145 * TRACK_MM + 146 * GAP_MM:.1f} mm" in said
     assert "enough for 13 motors" in said
-    assert width_needed(13) <= 3.0 < width_needed(14)
+    fourteen = load_array("forearm-patch", {"layout.rows": 2, "layout.columns": 7})
+    assert crowded_tracks(fourteen)
+    assert not crowded_tracks(replace(fourteen, places=fourteen.places[:13]))
 
 
 @pytest.mark.parametrize("name", array_templates())

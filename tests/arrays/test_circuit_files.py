@@ -133,7 +133,7 @@ def test_svg_and_table_name_every_motor():
     assert [(row["name"], float(row["x_mm"]), float(row["y_mm"])) for row in rows[:-1]] == [
         (place.name, pytest.approx(place.x, abs=1e-4), pytest.approx(place.y, abs=1e-4)) for place in array.places
     ]
-    assert float(rows[-1]["x_mm"]) == pytest.approx(laid.end[0], abs=1e-4)
+    assert float(rows[-1]["x_mm"]) == pytest.approx(laid.spine[-1].end[0], abs=1e-4)
 
 
 def test_the_body_is_as_thick_as_the_units_circuits():

@@ -7,7 +7,7 @@ import pytest
 from tests.arrays.made_arrays import findings, made
 from tests.moulds.faulty_sets import broken
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.constructions import constructions
+from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.errors import Refusal
@@ -90,7 +90,7 @@ _FAULTS = [
 @pytest.mark.parametrize(("code", "what", "change"), _FAULTS, ids=[what for _, what, _ in _FAULTS])
 def test_a_fault_in_the_tray_is_caught(code, what, change):
     array = load_array("forearm-pockets")
-    plan = constructions()["pockets"].plan(array)
+    plan = construction_of("pockets", "flat").plan(array)
     base = change(plan.tools[0].shape)
     altered = replace(plan, tools=(replace(plan.tools[0], shape=base), *plan.tools[1:]))
     assert code in broken(patch_moulds(array, altered))

@@ -34,9 +34,9 @@ def test_nine_units_have_three_rows_and_a_spine_between_two_columns():
 
 
 def test_a_spine_is_laid_where_it_is_asked_for():
-    assert wiring(nine(circuit={"spine_mm": -10.0})).end[0] == -10
+    assert wiring(nine(circuit={"spine_mm": -10.0})).spine[-1].end[0] == -10
     turned = wiring(nine(circuit={"rows": "y", "spine_mm": 10.0, "tail_mm": 3.0}))
-    assert turned.end == (nine().sheet.outline[0] - 3, 10)
+    assert turned.spine[-1].end == (nine().sheet.outline[0] - 3, 10)
     assert turned.rows[0].start[0] == turned.rows[0].end[0]
 
 
@@ -50,7 +50,7 @@ def test_a_hexagon_has_a_spine_that_steps_from_gap_to_gap():
 def test_one_column_needs_no_rows():
     found = wiring(nine(layout={"kind": "grid", "columns": 1, "rows": 4, "pitch_mm": 18.0}))
     assert found.rows == ()
-    assert found.end[0] == 0
+    assert found.spine[-1].end[0] == 0
 
 
 @pytest.mark.parametrize(

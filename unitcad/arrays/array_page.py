@@ -30,7 +30,7 @@ from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
 from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_page
-from unitcad.report.read_results import expect
+from unitcad.report.read_results import expect, read_sound, read_table
 from unitcad.shape import union
 from unitcad.shape.tree import Body
 from unitcad.spec import read_toml
@@ -143,11 +143,16 @@ def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
 
 
 def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
-    crosstalk, casting = (_read(folder / name, warn, _table_in) or {} for name in ("crosstalk.json", "casting.json"))
-    array, model, drawn = manifest["array"], _model(folder, warn), manifest["pictures"]
+    array, model, drawn = manifest["array"], _model(folder, warn), [Path(path).name for path in manifest["pictures"]]
+
+    def say(fault: str) -> None:
+        warn(f"warning: {fault}")
+
+    def table(name: str) -> dict[str, Any]:
+        return read_sound(folder / name, read_table, say) or {}
 
     def figures(*paths: str) -> list[str]:
-        return [_figure(folder / path, warn) for path in paths]
+        return [_figure(folder / path, say) for path in paths]
 
     parts = [
         '<div class="top"><div>',
@@ -158,10 +163,10 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         *_section("3D", [VIEW if model else ""]),
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*figures(*(f"pictures/patch-{side}.png" for side in SIDES)), _worn(array)]),
-        *_section("Crosstalk", [_answer(crosstalk), *figures("crosstalk-patch.svg", "crosstalk.svg")]),
-        *_section("Tools", figures(*(path for path in drawn if "/patch-" not in path))),
+        *_section("Crosstalk", [_answer(table("crosstalk.json")), *figures("crosstalk-patch.svg", "crosstalk.svg")]),
+        *_section("Tools", figures(*(f"pictures/{name}" for name in drawn if not name.startswith("patch-")))),
         *_section("Circuit", figures("circuit.svg")),
-        *_section("Casting", list(_casting(folder, casting))),
+        *_section("Casting", list(_casting(folder, table("casting.json")))),
         *_section("Units", [_units(folder, manifest)]),
         *_section("Places", [_places(array)]),
         *_section("Checks", [_checks(manifest)]),
@@ -181,32 +186,15 @@ def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
     return model | {key: compress(model[key]) for key in ("unit", "moulds")}
 
 
-def _read(path: Path, warn: Callable[[str], None], reader: Callable[[Path], Any]) -> Any:
-    """Return what a reader makes of a file; None for a missing file, with a warning for a damaged one."""
-    try:
-        return reader(path)
-    except files.NotThere:
-        return None
-    except UnitcadError as error:
-        warn(f"warning: {error}")
-        return None
-
-
-def _figure(path: Path, warn: Callable[[str], None]) -> str:
+def _figure(path: Path, say: Callable[[str], None]) -> str:
     """Return a drawing or picture with its caption."""
-    content = _read(path, warn, partial(files.read, largest=LARGEST, links=False))
+    content = read_sound(path, partial(files.read, largest=LARGEST, links=False), say)
     if content is None:
         return ""
     words = WORDS.get(path.name) or f"Pour {path.stem.removeprefix('pour')}, cut open"
     is_svg = path.suffix == ".svg"
     image = drawing(content.decode("utf-8", "replace"), words) if is_svg else picture(content, words)
     return f"<figure>{image}<figcaption>{escape(words)}</figcaption></figure>"
-
-
-def _table_in(path: Path) -> dict[str, Any]:
-    data = files.read_json(path, links=False)
-    expect(data, dict[str, Any], path)
-    return data
 
 
 def _line(array: Mapping[str, Any]) -> str:
@@ -343,12 +331,11 @@ def bent(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh of a cast solid around the limb: vertices (n, 3) in mm and faces (m, 3).
 
     x becomes the angle x over the middle's radius, z the distance from the limb's axis, which is y: the sheet's middle
-    keeps its length. The middle of the array is on top. A curved casting is so already. Raises ValueError for an
-    array that is worn flat.
+    keeps its length. The middle of the array is on top. A curved casting is so already.
     """
     radius, middle = array.radius_mm, array.middle_radius_mm
-    if radius is None or middle is None:
-        raise ValueError("the array is worn flat")
+    assert radius is not None  # an array that is worn flat has no such picture
+    assert middle is not None
     if array.cast == "curved":
         vertices, faces = arrays(solid)
         return np.asarray(vertices, float) + np.array([0.0, 0.0, radius]), np.asarray(faces, np.int64)
@@ -387,23 +374,21 @@ def pictures(moulds: PatchMoulds) -> dict[str, Callable[[], bytes]]:
     def patch() -> Iterable[Surface]:
         return (_solid(moulds, body) for body in patch_bodies(moulds.array))
 
+    def worn() -> Iterable[Surface]:
+        yield Surface(*arrays(limb(moulds.array)), SKIN)
+        for body in patch_bodies(moulds.array):
+            yield Surface(*bent(moulds.array, moulds.mesh(body)), body.colour)
+
     apart = shown(ABOVE, lambda: (_solid(moulds, *moved) for moved in take_apart(moulds)))
     names = {"patch-skin-side": shown(SKIN_SIDE, patch), "patch-back": shown(BACK, patch), "tools": apart}
     if moulds.array.radius_mm is not None:
-        names["patch-bent"] = shown(ALONG, partial(_worn_bodies, moulds))
+        names["patch-bent"] = shown(ALONG, worn)
     names |= {f"pour{s.index}": shown(ABOVE, partial(_cut_open, moulds, s)) for s in moulds.plan.steps}
     return {f"pictures/{name}.png": picture for name, picture in names.items()}
 
 
 def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
     return Surface(*arrays(moulds.mesh(body).translate(by)), body.colour)
-
-
-def _worn_bodies(moulds: PatchMoulds) -> Iterator[Surface]:
-    array = moulds.array
-    yield Surface(*arrays(limb(array)), SKIN)
-    for body in patch_bodies(array):
-        yield Surface(*bent(array, moulds.mesh(body)), body.colour)
 
 
 def take_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:

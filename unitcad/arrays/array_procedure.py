@@ -229,11 +229,10 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 
 def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
-    array: Array = moulds.array
     yield moulds.across
     yield (
-        f"The sheet between the units: {grams_shown(array.sheet.thickness_mm, 2)} mm thick, at its four edges and in "
-        "its middle. A lid that did not sit down shows here."
+        f"The sheet between the units: {grams_shown(moulds.array.sheet.thickness_mm, 2)} mm thick, at its four edges "
+        "and in its middle. A lid that did not sit down shows here."
     )
     weights = " + ".join(grams_shown(each) for each in grams) + f" = {grams_shown(sum(grams))}"
     yield f"Weigh one {moulds.makes}, trimmed, without motors and circuit: {weights} g. Less means air."

@@ -59,11 +59,6 @@ class Wiring:
         """Rows and spine."""
         return self.rows + self.spine
 
-    @property
-    def end(self) -> Point:
-        """The middle of the tail's end."""
-        return self.spine[-1].end
-
 
 def wiring(array: Array) -> Wiring:
     """Return the common circuit of an array's motors.
@@ -202,17 +197,13 @@ TRACK_MM = GAP_MM = 0.1
 """Least width of a track, and of the gap next to it (assumed: 4 mil, usual for flexible circuits)."""
 
 
-def width_needed(motors: int) -> float:
-    """Return how wide one layer of a track a motor and a common return is, mm, a gap at both edges."""
-    return (motors + 1) * (TRACK_MM + GAP_MM) + GAP_MM
-
-
 def crowded_tracks(array: Array) -> list[str]:
     """Return a sentence if spine and tail are too narrow for the tracks of all motors; otherwise []."""
     if not has_circuit(array):
         return []
     width, motors = (array.circuit or CircuitTable()).row_width_mm, len(array.places)
-    needed = width_needed(motors)
+    # One layer: a track a motor and a common return, a gap at both edges.
+    needed = (motors + 1) * (TRACK_MM + GAP_MM) + GAP_MM
     if needed <= width + 1e-9:
         return []
     most = int((width - GAP_MM) / (TRACK_MM + GAP_MM) + 1e-9) - 1
@@ -478,7 +469,8 @@ def pad_table(array: Array, laid: Wiring) -> bytes:
     for place in array.places:
         motor = motor_of(place.unit)
         add(place.name, "pad", (place.x, place.y), 2 * laid.pad.radius, place.unit.name, motor.name if motor else "")
-    add("tail", "end of the tail", laid.end, 2 * laid.spine[-1].half, "", "")
+    tail = laid.spine[-1]
+    add("tail", "end of the tail", tail.end, 2 * tail.half, "", "")
     return text.getvalue().encode()
 
 

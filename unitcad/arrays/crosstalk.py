@@ -243,23 +243,20 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
     nearest, worst = data["nearest"], data["worst"]
     if nearest is None:
         return ["A single unit has no neighbour: there is no crosstalk."]
+    values = data["sums"]["root_sum_of_squares"]
+    # Equivalent places differ by the rounding of their centres.
+    alike = max(values) - min(values) <= ALIKE * max(values)
+    most = "all get alike" if alike else f"{worst['place']} gets the most"
     return [
         f"{_ranged(nearest['centre'], 100, ' %')} of a unit's motion at its edge reaches the middle of its nearest "
         f"neighbour ({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
         f"and {_ranged(nearest['nearest_edge'], 100, ' %')} the neighbour's edge.",
-        f"With all other units on, {_most(data)}: {_ranged(worst['root_sum_of_squares'])} times one "
+        f"With all other units on, {most}: {_ranged(worst['root_sum_of_squares'])} times one "
         f"unit's edge level if the motors are not synchronous (root of the sum of squares), and "
         f"{_ranged(worst['sum'])} times if all are in phase.",
         _absolute_line(worst["place"], data["absolute"]),
         IN_BRACKETS,
     ]
-
-
-def _most(data: Crosstalk) -> str:
-    """Name the place that gets the most; equivalent places differ by the rounding of their centres."""
-    values = data["sums"]["root_sum_of_squares"]
-    alike = max(values) - min(values) <= ALIKE * max(values)
-    return "all get alike" if alike else f"{data['worst']['place']} gets the most"
 
 
 def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
@@ -323,7 +320,6 @@ def _absolute_line(place: str, ranges: Mapping[str, Any]) -> str:
 STEPS = 21
 _LIGHT, _DARK = (247, 251, 255), (8, 64, 129)
 _INK = "#111111"
-_FONT = 'font-family="sans-serif"'
 _MOST_NUMBERS, _MOST_NAMES = 20, 40
 """Units up to which each cell has its number, and each row and column its name."""
 _LETTER = 0.6
@@ -467,7 +463,7 @@ def _open(wide: float, tall: float) -> str:
     size = f"{coord(wide)} {coord(tall)}"
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" width="{coord(wide)}" height="{coord(tall)}" '
-        f'{_FONT}><rect width="{coord(wide)}" height="{coord(tall)}" fill="#ffffff"/>'
+        f'font-family="sans-serif"><rect width="{coord(wide)}" height="{coord(tall)}" fill="#ffffff"/>'
     )
 
 

@@ -45,7 +45,6 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
 
 _MOST_PLACES, _MOST_PAIRS = 64, 16
 """Units up to which each has a row, and each pair a cell, on the screen; the JSON has all."""
-_HOW = "root of the sum of squares, or sum in phase"
 
 
 def estimate_arrays(
@@ -85,12 +84,11 @@ def _print_details(data: Mapping[str, Any]) -> None:
     if len(names) <= _MOST_PLACES:
         each = zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
         rows = [{"unit": name, "root": number(root, 2), "sum": number(total, 2)} for name, root, total in each]
-        print_table(rows, f"sum of all other units there, times one unit's edge level: {_HOW}")
+        how = "root of the sum of squares, or sum in phase"
+        print_table(rows, f"sum of all other units there, times one unit's edge level: {how}")
     if 1 < len(names) <= _MOST_PAIRS:
         shares = [["-" if value is None else number(100 * value, 2) for value in row] for row in matrix]
-        rows = [
-            dict(zip(("drives", *names), (name, *row), strict=True)) for name, row in zip(names, shares, strict=True)
-        ]
+        rows = [{"drives": name, **dict(zip(names, row, strict=True))} for name, row in zip(names, shares, strict=True)]
         print_table(rows, "% of a unit's motion at its edge that reaches the middle of another")
     ranges = f"In brackets: {data['range']}."
     print_indented(ranges, *data["assumptions"], f"Distances are {data['distances']}.")

@@ -143,11 +143,11 @@ def cast_record(data: dict[str, Any]) -> CastRecord:
 
 def _expect_day(text: str) -> None:
     try:
-        day = datetime.date.fromisoformat(text)
+        day = datetime.date.fromisoformat(text).isoformat()
     except ValueError:
-        raise Refusal("cast_on", text, "must be a day such as 2026-03-14") from None
-    if day.isoformat() != text:
-        raise Refusal("cast_on", text, "must be a day such as 2026-03-14", day.isoformat())
+        day = None
+    if day != text:
+        raise Refusal("cast_on", text, "must be a day such as 2026-03-14", day)
 
 
 def _expect_time(text: str, field: str) -> None:

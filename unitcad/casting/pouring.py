@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from unitcad.casting.drawings import grip_of, tape_places, tongue_prop
@@ -435,7 +435,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
     ring = next((fitting for fitting in fittings if fitting.mixed), None)
     if ring:
-        (silicone,) = _by_layer(silicones, [ring.silicone])
+        silicone = _of_layer(silicones, ring.silicone)
         hours = at_room(float(silicone.cure_h), casting.room_c)
         what, said = ring.mixed, f"{silicone.name} cures {number(hours, 2)} h."
     elif any(ADHESIVE in fitting.required_tools for fitting in fittings):
@@ -505,9 +505,7 @@ def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPo
     """Return the silicones that are mixed after the pours, for rings round motors and for skins, one batch each."""
     cells, casting, dims = len(moulds.plan.layout.cells), moulds.spec.casting, moulds.dimensions
     fittings = () if moulds.design.laid_in else assembly(moulds)
-    wanted = [
-        (each.mixed, _by_layer(silicones, [each.silicone])[0], each.volume_mm3) for each in fittings if each.mixed
-    ]
+    wanted = [(each.mixed, _of_layer(silicones, each.silicone), each.volume_mm3) for each in fittings if each.mixed]
     if dims.skin:
         wanted.append(("skin", silicones[-1], film_mm3(moulds)))
     found = []
@@ -522,9 +520,9 @@ def film_mm3(moulds: MouldSet) -> float:
     return math.pi * moulds.dimensions.outer_radius**2 * moulds.dimensions.skin
 
 
-def _by_layer(silicones: Sequence[Material], layers: Iterable[int]) -> list[Material]:
-    """Return the silicones of layers (from 1, -1 the last)."""
-    return list(dict.fromkeys(silicones[min(i, len(silicones)) - (i > 0)] for i in sorted(layers)))
+def _of_layer(silicones: Sequence[Material], layer: int) -> Material:
+    """Return the silicone of a layer (from 1, -1 the last); of one that is not there the last."""
+    return silicones[min(layer, len(silicones)) - (layer > 0)]
 
 
 def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:

@@ -16,7 +16,7 @@ from unitcad.casting.figures import (
     print_min,
 )
 from unitcad.casting.steps import BenchStep, duration
-from unitcad.casting.views import level_on, picture_path
+from unitcad.casting.views import picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.limits import leaf_mm
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH
@@ -236,7 +236,9 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             minutes=3.0 * cells,
             required_tools=("sharp knife",),
         )
-    cup = spaced(level_on(moulds).cup)
+    core = moulds.dimensions.core_height
+    # The first whose rim takes a level: nothing on the base is higher.
+    cup = spaced(next((step for step in plan.steps if step.rim >= core - 1e-9), plan.steps[-1]).cup)
     enough, tool = fall(moulds)
     if lengths.pour == "injected":
         enough, tool = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents.", "level"

@@ -140,12 +140,6 @@ def pour_picture(pour: int, name: str) -> str:
     return picture_path(f"pour{pour}-{name}")
 
 
-def level_on(moulds: MouldSet) -> Step:
-    """Return the first pour whose rim takes a level: nothing on the base is higher."""
-    steps, core = moulds.plan.steps, moulds.dimensions.core_height
-    return next((step for step in steps if step.rim >= core - 1e-9), steps[-1])
-
-
 def _views(moulds: MouldSet) -> Views:
     plan, bottom = moulds.plan, moulds.plate[0]
     yield "pieces", View(place_pieces(plan.pieces), eye=OVER, group="pieces")

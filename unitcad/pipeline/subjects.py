@@ -40,26 +40,19 @@ class Compound(Subject):
     def read(cls, path: Path) -> dict[str, Any]:
         """Read a file as plain data with whole specs of its units. Raises Refusal or UnitcadError."""
 
-    @classmethod
+    @staticmethod
     @abstractmethod
-    def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
+    def offered(refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
         """Return the refusal of plain data with a nearest value that was tried and accepted."""
 
-    @classmethod
+    @staticmethod
     @abstractmethod
-    def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:
+    def write_page(folder: Path, warn: Callable[[str], None]) -> Path:
         """Write the page of a result's folder. Returns its path."""
 
-    @classmethod
+    @staticmethod
     @abstractmethod
-    def estimate(
-        cls,
-        names: Sequence[str],
-        sets: Sequence[str],
-        hertz: float | None,
-        details: bool,
-        as_json: bool,
-    ) -> None:
+    def estimate(names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool) -> None:
         """Print the estimate of one or several. `hertz`: the drive's frequency; None: the motor's. Raises Refusal."""
 
     @abstractmethod

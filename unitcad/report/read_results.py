@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -175,11 +175,11 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
     expect(manifest, Manifest, folder / MANIFEST)
     where = folder.relative_to(root).as_posix()
     damage: list[str] = []
-    tables = {name: _sound(lambda file=folder / f"{name}.json": _json(file), damage) for name in TABLES}
+    tables = {name: read_sound(folder / f"{name}.json", read_table, damage.append) for name in TABLES}
     listed = list(_regular(folder, damage))
     drawings = [path for path in listed if path.endswith(".svg")]
-    read = {path: _sound(lambda file=folder / path: _drawing(file), damage) for path in drawings}
-    casts = [_sound(lambda file=folder / path: _cast(file), damage) for path in _casts(listed)]
+    read = {path: read_sound(folder / path, _drawing, damage.append) for path in drawings}
+    casts = [read_sound(folder / path, _cast, damage.append) for path in _casts(listed)]
     record = VariantRecord(
         folder="" if where == "." else where,
         manifest=manifest,
@@ -200,14 +200,14 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
     return record, spec
 
 
-def _sound(read: Any, damage: list[str]) -> Any:
-    """Return the result of `read`; None without the file; None, and a line in `damage`, if it can't be read."""
+def read_sound(path: Path, read: Callable[[Path], Any], say: Callable[[str], object]) -> Any:
+    """Return the content of a file by `read`; None if it is missing, or damaged, which is said."""
     try:
-        return read()
+        return read(path)
     except files.NotThere:
         return None
     except UnitcadError as error:
-        damage.append(str(error))
+        say(str(error))
         return None
 
 
@@ -242,7 +242,7 @@ def check_casts(folder: Path) -> None:
     damage: list[str] = []
     for path in [*sorted(folder.glob(f"*{ENDING}")), *sorted(folder.glob(f"*/*{ENDING}"))]:
         if is_variant(path.parent):
-            _sound(lambda file=path: _cast(file), damage)
+            read_sound(path, _cast, damage.append)
     if damage:
         raise UnitcadError("\n".join(damage))
 
@@ -336,7 +336,7 @@ def _cell(value: Any) -> Any:
     return value if isinstance(value, int | float | str) and not isinstance(value, bool) else json.dumps(value)
 
 
-def _json(path: Path) -> dict[str, Any]:
+def read_table(path: Path) -> dict[str, Any]:
     """Read a JSON file with a table."""
     data = files.read_json(path, links=False)
     expect(data, dict[str, Any], path)

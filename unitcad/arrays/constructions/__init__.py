@@ -58,11 +58,6 @@ class Construction:
     cast: Cast = "flat"
 
 
-def constructions() -> dict[str, Construction]:
-    """Return the constructions by the name that a file's `array` gives, each cast flat."""
-    return {name: way for (name, cast), way in _found().items() if cast == "flat"}
-
-
 def construction_of(name: Name, cast: Cast) -> Construction:
     """Return a construction cast flat, or curved. Raises Refusal for one that is cast flat only."""
     if (name, cast) not in _found():
@@ -73,7 +68,6 @@ def construction_of(name: Name, cast: Cast) -> Construction:
 @cache
 def _found() -> dict[tuple[str, str], Construction]:
     """Return every CONSTRUCTION that a file of `constructions` defines, by its name and cast."""
-    folder = import_module("unitcad.arrays.constructions")
-    modules = (import_module(f"{folder.__name__}.{file.name}") for file in pkgutil.iter_modules(folder.__path__))
+    modules = (import_module(f"{__name__}.{file.name}") for file in pkgutil.iter_modules(__path__))
     found = (module.CONSTRUCTION for module in modules if hasattr(module, "CONSTRUCTION"))
     return {(construction.name, construction.cast): construction for construction in found}

@@ -130,9 +130,6 @@ def _cut(drawn: Drawing) -> Drawing:
     layer_mm3 = sheet_mm2(array) * sheet.thickness_mm + moats
     fault = too_much(array, (-x, -y, x, y), (sheet.low, dims.heights[-1]), layer_mm3)
 
-    def levers(found: Sequence[Seam]) -> tuple[tuple[PrySlot, ...], str]:
-        return pry_slots(drawn.spec, drawn.lay, found, drawn.pins.places, drawn.hole)
-
     under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
     base = seams_of(
         array,
@@ -140,11 +137,11 @@ def _cut(drawn: Drawing) -> Drawing:
         f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm",
         clear,
         close,
-        lambda found: levers(found)[1],
+        lambda found: pry_slots(drawn, found)[1],
         under=under,
     )
     cups = seams_of(array, (-x, -y, x, y), f"a cup of {2 * x:.4g} x {2 * y:.4g} mm", clear, close, fault, other=base)
-    cut_at = replace(drawn, base_seams=base, cup_seams=cups, pry=levers(base)[0])
+    cut_at = replace(drawn, base_seams=base, cup_seams=cups, pry=pry_slots(drawn, base)[0])
     return replace(cut_at, pins=replace(drawn.pins, places=(*drawn.pins.places, *_more_pins(cut_at))))
 
 
@@ -220,7 +217,7 @@ def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") 
     label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
     base = base_piece(engrave(blanks[0], list(_base_letters(drawing, f"B{label}"))))
     base = replace(base, removal=DOWN) if any(sheets) else base
-    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
+    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, -spec.moulds.plate_mm) for cell in lay.cells])
     cups: list[Body] = []
     steps: list[Step] = []
     for pour, (blank, sheet) in enumerate(zip(blanks[1:], sheets, strict=True), 1):
@@ -288,18 +285,13 @@ def _engraving(spec: Spec, top: float) -> tuple[float, float]:
     return top - spec.moulds.engraving_depth_mm, top + BEYOND
 
 
-def _bottom(spec: Spec) -> float:
-    """Return z of the base's lower face: its plate has no plinth."""
-    return -spec.moulds.plate_mm
-
-
 def _base(drawing: Drawing) -> Shape:
     """Draw the base: plate, cores, fins and pins in one piece, with pry slots and the filaments' ways."""
     spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
-    plate = Extrude(outline(lay.plate, MARK), _bottom(spec), 0.0)
+    plate = Extrude(outline(lay.plate, MARK), -spec.moulds.plate_mm, 0.0)
     cores = [moved(core(dims), cell.x, cell.y) for cell in lay.cells]
     ridges = [fin.drawn(fin.reach, 0.0, -BEYOND, dims.core_height) for fin in drawing.fins]
-    ways = [filament.way(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells]
+    ways = [filament.way(spec, dims, lay, cell, -spec.moulds.plate_mm) for cell in lay.cells]
     # Drawn for a plate under a plinth.
     slots = [moved(pry_slot(spec, lay, side), z=-plate_top(spec)) for side in (1, -1)]
     slots += [slot.drawn(lay) for slot in drawing.pry if not slot.customary]
@@ -470,15 +462,13 @@ class PrySlot(NamedTuple):
         return box(x0, x1, y0, y1, -self.depth, BEYOND / 4)
 
 
-def pry_slots(
-    spec: Spec, lay: Layout, seams: Sequence[Seam], pins: Sequence[Point], hole: float
-) -> tuple[tuple[PrySlot, ...], str]:
+def pry_slots(drawn: Drawing, seams: Sequence[Seam]) -> tuple[tuple[PrySlot, ...], str]:
     """Return the slots of a base, and the reason why a piece can't be freed, "" if all can.
 
     There is a slot in the middle of the left and of the right edge. A piece that has neither of the two gets its own:
-    at its left and right edge, or at the front and the back. Existing `pins` have holes of the radius
-    `hole` (mm).
+    at its left and right edge, or at the front and the back.
     """
+    spec, lay = drawn.spec, drawn.lay
     depth, plate = plate_top(spec) - pry_floor(spec), (-lay.plate[0], -lay.plate[1], *lay.plate)
     found: list[PrySlot] = []
     for i, piece in enumerate(pieces(plate, seams), 1):
@@ -486,7 +476,7 @@ def pry_slots(
         middle = piece[1] < 0.0 < piece[3]
         own = [PrySlot(i, side, 0.0, depth) for side in ("right", "left") if side in sides and middle]
         for pair in (("left", "right"), ("front", "back")):
-            at = (slot for side in pair if side in sides for slot in _at(spec, lay, piece, side, pins, hole))
+            at = (slot for side in pair if side in sides for slot in _at(drawn, piece, side))
             own = own or [PrySlot(i, *slot) for slot in at]
         if not own:
             why = f"piece {i} of the base has no room at its edges for a pry slot, and nothing would lever it off"
@@ -495,21 +485,19 @@ def pry_slots(
     return tuple(found), ""
 
 
-def _at(
-    spec: Spec, lay: Layout, piece: Box, side: Side, pins: Sequence[Point], hole: float
-) -> Iterator[tuple[Side, float, float]]:
+def _at(drawn: Drawing, piece: Box, side: Side) -> Iterator[tuple[Side, float, float]]:
     """Yield side, middle and depth of a piece's slot, as near to its middle as leaves room for a pin; or nothing."""
     to_side, sign = SIDES[side]
     axis = 1 - to_side
-    ends, edge = along_side(piece, side), lay.plate[axis]
+    ends, edge = along_side(piece, side), drawn.lay.plate[axis]
     low, high = (end + sign * (BESIDE if abs(end) < edge else MARK) for end, sign in zip(ends, (1, -1), strict=True))
-    near = PRY_HALF_WIDTH + hole + spec.moulds.least_wall_mm
-    standing = [pin[axis] for pin in pins if sign * pin[to_side] > 0]
+    near = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
+    standing = [pin[axis] for pin in drawn.pins.places if sign * pin[to_side] > 0]
     count = math.floor((high - low - 2 * PRY_HALF_WIDTH) / STEP + 1e-9)
     places = (low + PRY_HALF_WIDTH + STEP * i for i in range(count + 1))
     for middle in sorted(places, key=lambda place: (abs(place - (low + high) / 2), place)):
         beside = (ends[0] + 2 * PIN_RADIUS < middle - near, middle + near < ends[1] - 2 * PIN_RADIUS)
-        depth = _depth(spec, lay, side, middle)
+        depth = _depth(drawn.spec, drawn.lay, side, middle)
         if any(beside) and depth and all(abs(middle - pin) >= near for pin in standing):
             yield side, middle, depth
             return

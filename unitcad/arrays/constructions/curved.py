@@ -113,7 +113,6 @@ class Former:
     """Dimensions of base and lid, mm: half sizes, the seat next to the barrel, the base's lower face, pins on it."""
 
     array: Array
-    spec: Spec
     dims: Dimensions
     half: tuple[float, float]
     seat: float
@@ -214,7 +213,7 @@ def _former(array: Array) -> Former:
             if field == "bed_y_mm" and (fewer := _rows_that_fit(array, needed)):
                 raise Refusal("layout.rows", array.layout["rows"], limit, fewer)
             raise Refusal(f"moulds.{field}", getattr(moulds, field), limit, math.ceil(needed * 10 - 1e-6) / 10)
-    return Former(array, spec, dims, half, seat, bottom, Pins(places, PIN_HEIGHT, moulds.plinth_clearance_mm, seat))
+    return Former(array, dims, half, seat, bottom, Pins(places, PIN_HEIGHT, moulds.plinth_clearance_mm, seat))
 
 
 def _rows_that_fit(array: Array, length: float) -> int:
@@ -258,7 +257,7 @@ def _moats(former: Former) -> list[Shape]:
 
 def _filament_ways(former: Former) -> list[Shape]:
     """Draw a hole through each core along its axis, and the pocket under the base in which its filament is taken."""
-    array, radius, bottom = former.array, former.spec.moulds.filament_hole_mm / 2, former.bottom
+    array, radius, bottom = former.array, former.array.unit.moulds.filament_hole_mm / 2, former.bottom
     drawn: list[Shape] = []
     cone = Revolve(polygon((0, -BEYOND), (GRIP_RADIUS + BEYOND, -BEYOND), (0, GRIP_RADIUS)))
     for place in array.places:
@@ -271,7 +270,7 @@ def _filament_ways(former: Former) -> list[Shape]:
 
 def _filaments(former: Former) -> list[Shape]:
     """Draw the filaments: flush with the core's top, their lower ends on the bench."""
-    array, radius = former.array, former.spec.moulds.filament_mm / 2
+    array, radius = former.array, former.array.unit.moulds.filament_mm / 2
     (x, y), bottom = former.half, former.bottom
     room = box(-2 * x, 2 * x, -2 * y, 2 * y, bottom, former.top)
     return [
@@ -290,7 +289,7 @@ def _channels(former: Former, low: float, top: float) -> list[Shape]:
     vent, places = VENT / 2, _vents(former)
     sheet = former.array.sheet
     middle = (sheet.outline[1] + sheet.outline[3]) / 2
-    sprue = moved(cylinder(former.spec.moulds.sprue_mm / 2, low, top), 0.0, middle)
+    sprue = moved(cylinder(former.array.unit.moulds.sprue_mm / 2, low, top), 0.0, middle)
     drawn = [sprue]
     for x in places:
         along = (sheet.outline[3] - sheet.outline[1]) / 2 - _vent_off_end(former, x) - vent
@@ -312,7 +311,7 @@ def _vent_off_end(former: Former, x: float) -> float:
 def _vents(former: Former) -> list[float]:
     """Return the places of vents across the top, mm: one is near the highest line of any tilt."""
     count, places = 2, _spread(former, 2)
-    limit = MESH_ROOM * deepest(former.spec, len(former.spec.layers) - 1)
+    limit = MESH_ROOM * deepest(former.array.unit, len(former.array.unit.layers) - 1)
     # An odd number of vents puts one in the middle, if none is nearer to the end.
     at_end = max(limit, _kept_at_end(former, [0.0]))
     # Between two vents air stays up to halfway, tilted round the limb.
@@ -342,7 +341,7 @@ def _kept_at_end(former: Former, places: list[float]) -> float:
 def _lid(former: Former) -> Shape:
     """Draw the lid: a block bored to the sheet's back, a relief over the seat, holes for the pins."""
     (x, y), array = former.half, former.array
-    under = former.seat + former.spec.moulds.seat_relief_mm
+    under = former.seat + former.array.unit.moulds.seat_relief_mm
     holes = pin_holes(former.pins)
     ways = _channels(former, array.sheet.high - 2 * BEYOND, former.top + BEYOND)
     return cut(box(-x, x, -y, y, under, former.top), [barrel(array, former.back), *holes, *ways])
@@ -362,7 +361,7 @@ def _seals(former: Former) -> list[Shape]:
 
 def _letters(former: Former, label: str, top: float) -> list[Shape]:
     """Draw a label that reads along the limb on a face, its foot towards +x."""
-    stroke, depth = former.spec.moulds.engraving_stroke_mm, former.spec.moulds.engraving_depth_mm
+    stroke, depth = former.array.unit.moulds.engraving_stroke_mm, former.array.unit.moulds.engraving_depth_mm
     drawn = turned(engraving(label, stroke, top - depth, top + BEYOND), "z", 1)
     return [moved(drawn, -former.half[0] + 1.0 + HEIGHT * stroke, -text_width(label, stroke) / 2)]
 

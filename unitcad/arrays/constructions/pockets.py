@@ -182,12 +182,6 @@ def cast_sheet(array: Array) -> Shape:
     return cut(Extrude(rounded(drawn.outline, drawn.corner_mm), 0.0, thickness), [*holes, *slots])
 
 
-def bodies(array: Array) -> tuple[Body, ...]:
-    """Return the sheet."""
-    colour = layer_colour(2)
-    return (Body("layer1", "unit", "layer", cast_sheet(array), colour, made="cast", step=1),)
-
-
 CONSTRUCTION = Construction(
     name="pockets",
     about="a sheet with holes for finished units, which can be tested first and exchanged",
@@ -196,7 +190,7 @@ CONSTRUCTION = Construction(
     thickness_mm=2.0,
     apart=apart,
     level=level,
-    bodies=bodies,
+    bodies=lambda array: (Body("layer1", "unit", "layer", cast_sheet(array), layer_colour(2), made="cast", step=1),),
     plan=plan,
     unfit=unfit,
 )

@@ -42,19 +42,13 @@ class LayoutKind:
     naming: str = "Rows are lettered from the top, columns numbered from the left."
 
 
-def row_letters(row: int) -> str:
-    """Return the letters of a row from 0: A to Z, then AA, AB ..."""
-    letters = ""
-    row += 1
-    while row:
-        row, rest = divmod(row - 1, 26)
-        letters = chr(ord("A") + rest) + letters
-    return letters
-
-
 def named(row: int, column: int) -> str:
-    """Return a place's name from its row and column, both from 0."""
-    return f"{row_letters(row)}{column + 1}"
+    """Return a place's name from its row and column, both from 0: rows are A to Z, then AA, AB ..."""
+    letters, left = "", row + 1
+    while left:
+        left, rest = divmod(left - 1, 26)
+        letters = chr(ord("A") + rest) + letters
+    return f"{letters}{column + 1}"
 
 
 def needs(distance: float, pair: tuple[Point, Point]) -> str:
@@ -63,8 +57,6 @@ def needs(distance: float, pair: tuple[Point, Point]) -> str:
     there = ((one.x - other.x) ** 2 + (one.y - other.y) ** 2) ** 0.5
     return f"{one.name} and {other.name} are {there:.4g} mm apart and need {distance:.4g} mm"
 
-
-__all__ = ["LayoutKind", "Point", "layouts"]
 
 MOST_PLACES = 1024
 
