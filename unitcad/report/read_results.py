@@ -10,6 +10,7 @@ import base64
 import json
 import os
 from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -175,11 +176,15 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
     expect(manifest, Manifest, folder / MANIFEST)
     where = folder.relative_to(root).as_posix()
     damage: list[str] = []
-    tables = {name: _sound(lambda file=folder / f"{name}.json": _json(file), damage) for name in TABLES}
+    tables = {name: _sound(partial(_json, folder / f"{name}.json"), damage) for name in TABLES}
     listed = list(_regular(folder, damage))
     drawings = [path for path in listed if path.endswith(".svg")]
-    read = {path: _sound(lambda file=folder / path: _drawing(file), damage) for path in drawings}
-    casts = [_sound(lambda file=folder / path: _cast(file), damage) for path in _casts(listed)]
+    read = {
+        path: _sound(partial(files.read_text, folder / path, largest=LARGEST_DRAWING, links=False), damage)
+        for path in drawings
+    }
+    recorded = [path for path in listed if path.endswith(ENDING) and "/" not in path][:MOST_CASTS]
+    casts = [_sound(partial(_cast, folder / path), damage) for path in recorded]
     record = VariantRecord(
         folder="" if where == "." else where,
         manifest=manifest,
@@ -233,16 +238,12 @@ def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
     return iter(sorted(listed)[:MOST_FILES])
 
 
-def _casts(listed: list[str]) -> list[str]:
-    return [path for path in listed if path.endswith(ENDING) and "/" not in path][:MOST_CASTS]
-
-
 def check_casts(folder: Path) -> None:
     """Raise UnitcadError, a line for each, for damaged cast records in a result, or in those of a batch."""
     damage: list[str] = []
     for path in [*sorted(folder.glob(f"*{ENDING}")), *sorted(folder.glob(f"*/*{ENDING}"))]:
         if is_variant(path.parent):
-            _sound(lambda file=path: _cast(file), damage)
+            _sound(partial(_cast, path), damage)
     if damage:
         raise UnitcadError("\n".join(damage))
 
@@ -254,10 +255,6 @@ def _cast(path: Path) -> dict[str, Any]:
     except Refusal as refused:
         raise UnitcadError(f"{path}: {refused}") from None
     return {"file": path.name, **msgspec.to_builtins(structs.replace(record, spec=None))}
-
-
-def _drawing(path: Path) -> str:
-    return files.read_text(path, largest=LARGEST_DRAWING, links=False)
 
 
 def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str]) -> ResultsTable:
@@ -280,34 +277,17 @@ def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], d
             for entry in entries
         ]
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
-    swept = _swept(columns)
-    columns = _in_order(columns, swept)
+    # Chosen values are the columns before `name` in a batch; else the spec's.
+    before = columns[: columns.index("name")] if "name" in columns else []
+    swept = {name for name in before if name not in OF_EVERY_BATCH}
+    swept |= {name for name in columns if name in ("design", "diameter_mm") or name.startswith("layers.")}
+    columns.sort(key=lambda name: (name != "name", name not in swept, not name.startswith("edge_")))
     there = {each.folder for each in variants}
     rows = [
         [folder if (folder := entry.get("folder")) in there else "", *(_cell(entry.get(c)) for c in columns)]
         for entry in entries
     ]
     return ResultsTable(columns, rows, [name for name in columns if name in swept])
-
-
-def _swept(columns: list[str]) -> set[str]:
-    """Return the columns of chosen values: those before `name` in a batch; else the spec's."""
-    before = columns[: columns.index("name")] if "name" in columns else []
-    given = {name for name in columns if name in ("design", "diameter_mm") or name.startswith("layers.")}
-    return {name for name in before if name not in OF_EVERY_BATCH} | given
-
-
-def _in_order(columns: list[str], swept: set[str]) -> list[str]:
-    """Order columns: name, swept values, the edge's levels, the rest."""
-
-    def place(name: str) -> int:
-        if name == "name":
-            return 0
-        if name in swept:
-            return 1
-        return 2 if name.startswith("edge_") else 3
-
-    return sorted(columns, key=place)
 
 
 def _row(record: VariantRecord) -> dict[str, Any]:
