@@ -13,6 +13,7 @@ import msgspec
 from unitcad import __version__, files
 from unitcad.casting.cast_record import ENDING, FORMAT, HASH_DIGITS
 from unitcad.casting.preparation import MEASURED_MM
+from unitcad.casting.procedure import Procedure
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.write import BENCH
@@ -24,106 +25,6 @@ PROGRAMS = ("dom.js", "glb.js", "bench.js")
 STYLES = ("app/page.css", "app/bench.css")
 
 
-class ListedStep(msgspec.Struct):
-    """A step of casting.json, as far as the page relies on it."""
-
-    title: str
-    text: str
-    picture: str
-    kind: str
-    minutes: float
-    wait_min: float
-    short: str = ""
-
-
-class ListedFigure(msgspec.Struct):
-    """A figure of a pour."""
-
-    name: str
-    value: float
-
-
-class ListedPour(msgspec.Struct):
-    """A pour of casting.json."""
-
-    index: int
-    material: str
-    figures: list[ListedFigure]
-    part_a_g: float
-    part_b_g: float
-    pot_life_min: float
-    cure_h: float
-    steps: list[ListedStep]
-    layer: str = ""
-
-
-class ListedPhase(msgspec.Struct):
-    """A phase of casting.json's time line."""
-
-    name: str
-    start_min: float
-    bench_min: float
-    wait_min: float
-
-
-class ListedItem(msgspec.Struct):
-    """A line of the bill."""
-
-    item: str
-    quantity: float
-    unit: str
-    made: str
-    note: str
-
-
-class ListedSize(msgspec.Struct):
-    """A length to measure before printing."""
-
-    what: str
-    keys: list[str]
-    value_mm: float
-    assumed: str
-
-
-class ListedPrinting(msgspec.Struct):
-    """The lengths to measure and the plates to print."""
-
-    sizes: list[ListedSize]
-    source: str
-    how: list[str]
-
-
-class ListedTrouble(msgspec.Struct):
-    """A fault and its remedies."""
-
-    sign: str
-    cause: str
-    now: str
-    spec: str
-
-
-class CastingFile(msgspec.Struct):
-    """The part of casting.json that the page shows."""
-
-    name: str
-    label: str
-    cells: int
-    earliest_finish_min: float
-    bench_min: float
-    time_line: list[ListedPhase]
-    printing: ListedPrinting
-    preparation: list[ListedStep]
-    pours: list[ListedPour]
-    release: list[ListedStep]
-    assembly: list[ListedStep]
-    measure: list[str]
-    bill: list[ListedItem]
-    warnings: list[str]
-    troubles: list[ListedTrouble]
-    makes: str = "unit"
-    last: str = "Motor in"
-
-
 def write_bench(folder: Path) -> Path | None:
     """Write `folder`/bench.html for the variant in `folder` and return its path; None if it has no procedure.
 
@@ -133,12 +34,14 @@ def write_bench(folder: Path) -> Path | None:
         data = files.read_json(folder / "casting.json", links=False)
     except files.NotThere:
         return None
-    expect(data, CastingFile, folder / "casting.json")
-    casting = msgspec.convert(data, CastingFile)
+    expect(data, Procedure, folder / "casting.json")
+    casting = msgspec.convert(data, Procedure)
     try:
         spec = spec_in(folder)
     except UnitcadError:  # such as one that runs code: the record then names it only by its hash
         spec = None
+    steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
+    steps += [*casting.release, *casting.assembly]
     content: dict[str, Any] = {
         "version": __version__,
         "casting": msgspec.to_builtins(casting),
@@ -149,7 +52,7 @@ def write_bench(folder: Path) -> Path | None:
         "asked": _expected_measures(casting, spec),
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
         "measured_mm": MEASURED_MM,
-        "pictures": step_pictures(folder, _paths(casting)),
+        "pictures": step_pictures(folder, (step.picture for step in steps)),
     }
     target = folder / BENCH
     text = html_page(content, f"{casting.name}: bench", PROGRAMS, STYLES, (), "Without a script, read casting.md.")
@@ -157,7 +60,7 @@ def write_bench(folder: Path) -> Path | None:
     return target
 
 
-def _expected_measures(casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
+def _expected_measures(casting: Procedure, spec: Spec | None) -> dict[str, Any]:
     """Return the expected measures of a unit, mm and g: the page refuses values far from them. {} if unknown."""
     if spec is None:
         return {}
@@ -175,8 +78,3 @@ def _hash(folder: Path) -> str:
     manifest = files.read_json(folder / "manifest.json", links=False)
     expect(manifest, Manifest, folder / "manifest.json")
     return str(manifest["hash"])
-
-
-def _paths(casting: CastingFile) -> list[str]:
-    steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
-    return [step.picture for step in (*steps, *casting.release, *casting.assembly)]
