@@ -13,6 +13,7 @@ from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
+from benchmarks.accuracy.brep_measures import Measures, measure
 from unitcad.kernels import occt
 
 
@@ -22,7 +23,7 @@ class StepBody:
 
     name: str
     colour: tuple[float, float, float] | None
-    measures: occt.Measures
+    measures: Measures
 
 
 def read(path):
@@ -56,7 +57,7 @@ def _body(label, colours):
     colour = found.pop() if len(found) == 1 else None
     name = TDataStd_Name()
     text = name.Get().ToExtString() if label.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
-    return StepBody(text, colour, occt.measure(XCAFDoc_ShapeTool.GetShape_s(label)))
+    return StepBody(text, colour, measure(XCAFDoc_ShapeTool.GetShape_s(label)))
 
 
 def _colour(solid, colours):

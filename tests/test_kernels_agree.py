@@ -35,6 +35,7 @@ from unitcad.shape import (
 )
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
+brep_measures = importlib.import_module("benchmarks.accuracy.brep_measures")
 WITHOUT_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)
 """Making a failing tree smaller takes minutes of booleans."""
 BODIES = {body.name: body for body in all_bodies()}
@@ -62,7 +63,7 @@ def solids_of(shape):
 
 
 def assert_breps_agree(shape, share=1e-9):
-    measured = {name: occt.measure(solid) for name, solid in solids_of(shape).items()}
+    measured = {name: brep_measures.measure(solid) for name, solid in solids_of(shape).items()}
     reference = measured.pop("occt")
     for other in measured.values():
         assert other.solids == reference.solids

@@ -42,7 +42,8 @@ def estimate_spec(
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
     data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
     if "fit" in data:
-        data["fit"] = {**_fit_file(spec), **data["fit"]}
+        sha256 = hashlib.sha256((spec.estimate.fit_source or "").encode()).hexdigest()
+        data["fit"] = {"file": spec.estimate.fit, "sha256": sha256, **data["fit"]}
     if FEM in asked:
         from unitcad.attenuation.fem.unit import fem_sensitivities, range_block
 
@@ -54,14 +55,6 @@ def estimate_spec(
 def fit_of(spec: Spec) -> LabFit | None:
     """Return the lab's fit that a spec names."""
     return None if spec.estimate.fit_source is None else lab_fit(spec.estimate.fit_source)
-
-
-def _fit_file(spec: Spec) -> dict[str, Any]:
-    """Return name and SHA-256 of the file of a spec's fit."""
-    return {
-        "file": spec.estimate.fit,
-        "sha256": hashlib.sha256((spec.estimate.fit_source or "").encode()).hexdigest(),
-    }
 
 
 def closed_forms(models: Sequence[str]) -> tuple[str, ...]:

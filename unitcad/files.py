@@ -104,7 +104,7 @@ def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
     """Return the data of a JSON file, all of its numbers finite; else as `read`."""
     text = read_text(path, largest=largest, links=links)
     try:
-        return json.loads(text, parse_constant=_no_number, parse_float=_finite)
+        return json.loads(text, parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         raise UnitcadError(f"{path}: not JSON: {error}") from None
 
@@ -326,12 +326,8 @@ def _sync(file: IO[bytes]) -> None:
     os.fsync(file.fileno())
 
 
-def _no_number(text: str) -> Any:
-    raise ValueError(f"{text} is no number")
-
-
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text} is out of range")
+        raise ValueError(f"{text} is {'no number' if text.strip('-').isalpha() else 'out of range'}")
     return value

@@ -79,5 +79,5 @@ def place(shape: B3dShape, turn: Turn, move: brep.Point) -> B3dShape:
 def _solids(shapes: Sequence[Shape]) -> list[B3dShape]:
     # Cleaned once at the end instead of after each boolean.
     with SkipClean():
-        made = brep.realise(shapes, sys.modules[__name__])  # type: ignore[arg-type]
+        made = brep.realise(shapes, sys.modules[__name__])
     return [shape.clean() for shape in made]

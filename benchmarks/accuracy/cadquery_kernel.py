@@ -75,5 +75,5 @@ def place(shape: cq.Shape, turn: Turn, move: brep.Point) -> cq.Shape:
 
 
 def _solids(shapes: Sequence[Shape]) -> list[cq.Shape]:
-    made = [shape.clean() for shape in brep.realise(shapes, sys.modules[__name__])]  # type: ignore[arg-type]
+    made = [shape.clean() for shape in brep.realise(shapes, sys.modules[__name__])]
     return [shape.Solids()[0] if len(shape.Solids()) == 1 else shape for shape in made]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.accuracy import build123d_kernel, cadquery_kernel
+from benchmarks.accuracy.brep_measures import Measures, measure
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.measures import mesh_volume
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
@@ -19,7 +20,6 @@ from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.designs import shipped
 from unitcad.errors import Refusal
 from unitcad.kernels import bounds, mesh, occt
-from unitcad.kernels.occt import Measures
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
 from unitcad.validation import from_data, templates
@@ -45,7 +45,7 @@ def run(quick: bool, say: Say) -> Result:
         mesh.forget()
         for kernel, time in interleaved(_makers(shapes, variant.segments), 1, warm=False).items():
             seconds.setdefault(kernel, []).append(time.median)
-            measured[kernel] = [(_of_mesh if kernel == "manifold3d" else occt.measure)(solid) for solid in time.value]
+            measured[kernel] = [(_of_mesh if kernel == "manifold3d" else measure)(solid) for solid in time.value]
         for kernel in worst:
             for exact, other in zip(measured["OCCT"], measured[kernel], strict=True):
                 for quantity, value in _differences(exact, other).items():

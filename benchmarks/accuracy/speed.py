@@ -210,6 +210,7 @@ def _volume_error(folder: Path) -> dict[str, float]:
     """Return the relative volume error of every STL in a folder against OCCT's volume of the same tree."""
     import trimesh
 
+    from benchmarks.accuracy.brep_measures import measure
     from unitcad.kernels import occt
 
     variant = Variant.of(default_template())
@@ -218,7 +219,7 @@ def _volume_error(folder: Path) -> dict[str, float]:
     for body, solid in zip(bodies, occt.solids([body.shape for body in bodies]), strict=True):
         mesh = trimesh.load_mesh(folder / f"{body.name}.stl", process=False)
         volume = mesh_volume(mesh.vertices, mesh.faces)[0]
-        errors[body.name] = volume / occt.measure(solid).volume - 1
+        errors[body.name] = volume / measure(solid).volume - 1
     return errors
 
 

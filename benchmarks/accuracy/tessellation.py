@@ -218,10 +218,11 @@ _TRUE, _PLAIN = "manifold3d, area-true", "manifold3d, plain"
 
 
 def _rows(shape: Shape, radius: float, tolerances: tuple[float, ...], repeats: int) -> list[_Row]:
+    from benchmarks.accuracy.brep_measures import measure
     from unitcad.kernels import occt
 
     (brep,) = occt.solids([shape])
-    true_volume = occt.measure(brep).volume
+    true_volume = measure(brep).volume
     rows = []
     for tolerance in tolerances:
         for method, time in interleaved(_methods(shape, radius, tolerance), repeats).items():

@@ -143,7 +143,7 @@ def _exact(shapes: Sequence[Shape]) -> dict[Shape, tuple[Any, float]]:
     """Return each shape's solid by OCCT, and its volume (mm3)."""
     from unitcad.kernels import occt
 
-    return {s: (solid, occt.measure(solid).volume) for s, solid in zip(shapes, occt.solids(shapes), strict=True)}
+    return {s: (solid, occt.volume(solid)) for s, solid in zip(shapes, occt.solids(shapes), strict=True)}
 
 
 def distance(vertices: np.ndarray, faces: np.ndarray, brep: Any, samples: int) -> float:

@@ -62,12 +62,14 @@ def _of_cavity(cavity: Cavity, limit: float) -> MouldFinding:
 
 def pockets(cavity: Manifold, top: float) -> list[Pocket]:
     """Return the pockets of a cavity that is open at z = `top` (mm), over `ATTITUDES`, the deepest first."""
-    surface = _Boundary.of(cavity)
-    opening = surface.vertices[:, 2] >= top - _AT_TOP
+    vertices, faces = arrays(cavity)
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges = np.stack(np.divmod(np.unique(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
+    normals, opening = _normals(vertices, faces), vertices[:, 2] >= top - _AT_TOP
     kept = [
         Pocket(depth, tilt, azimuth, tuple(peak.tolist()))
         for tilt, azimuth in ATTITUDES
-        for depth, peak in _pockets(surface, opening, upwards(tilt, azimuth))
+        for depth, peak in _pockets(vertices, edges, normals, opening, upwards(tilt, azimuth))
     ]
     return sorted(kept, key=lambda pocket: -pocket.depth)
 
@@ -90,52 +92,43 @@ def upwards(tilt: float, azimuth: float) -> np.ndarray:
     return np.array([math.sin(t) * math.cos(a), math.sin(t) * math.sin(a), math.cos(t)])
 
 
-@dataclass(frozen=True)
-class _Boundary:
-    """A cavity's boundary: vertices (n, 3), edges (m, 2), outward normals at the vertices weighted by angle (n, 3)."""
-
-    vertices: np.ndarray
-    edges: np.ndarray
-    normals: np.ndarray
-
-    @classmethod
-    def of(cls, solid: Manifold) -> _Boundary:
-        vertices, faces = arrays(solid)
-        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges = np.stack(np.divmod(np.unique(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
-        corners = vertices[faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        normals = np.zeros_like(vertices)
-        for i in range(3):
-            a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
-            lengths = np.maximum(np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-300)
-            angle = np.arccos(np.clip(np.einsum("ij,ij->i", a, b) / lengths, -1, 1))
-            np.add.at(normals, faces[:, i], angle[:, None] * normal)
-        return cls(vertices, edges, normals)
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the outward normals at the vertices, weighted by angle."""
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normals = np.zeros_like(vertices)
+    for i in range(3):
+        a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
+        lengths = np.maximum(np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-300)
+        angle = np.arccos(np.clip(np.einsum("ij,ij->i", a, b) / lengths, -1, 1))
+        np.add.at(normals, faces[:, i], angle[:, None] * normal)
+    return normals
 
 
-def _pockets(surface: _Boundary, opening: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray]]:
+def _pockets(
+    vertices: np.ndarray, edges: np.ndarray, normals: np.ndarray, opening: np.ndarray, up: np.ndarray
+) -> list[tuple[float, np.ndarray]]:
     """Return (depth, peak) of every ceiling peak that does not meet the opening."""
-    height = surface.vertices @ up
-    first, second = surface.edges.T
+    height = vertices @ up
+    first, second = edges.T
     level = np.abs(height[first] - height[second]) <= _SAME
-    plateau = components(len(height), *surface.edges[level].T)
+    plateau = components(len(height), *edges[level].T)
     count = int(plateau.max(initial=-1)) + 1
     rises = np.zeros(count, dtype=bool)
     step = height[second] - height[first]
     rises[plateau[first[step > _SAME]]] = True
     rises[plateau[second[step < -_SAME]]] = True
     # A sum of angle-weighted normals points out of the cavity: up at a ceiling, down at the top of an obstacle.
-    facing = np.bincount(plateau, weights=surface.normals @ up, minlength=count)
+    facing = np.bincount(plateau, weights=normals @ up, minlength=count)
     opens = np.bincount(plateau, weights=opening, minlength=count) > 0
     peaks = np.nonzero(~rises & ~opens & (facing > 0))[0]
-    vertices = [int(np.nonzero(plateau == peak)[0][0]) for peak in peaks]
-    if not vertices:
+    tops = [int(np.nonzero(plateau == peak)[0][0]) for peak in peaks]
+    if not tops:
         return []
     # A pocket without a way out empties nowhere.
-    low = np.maximum(_ways_out(surface.edges, height, opening), height.min())
-    return [(float(height[vertex] - low[vertex]), surface.vertices[vertex]) for vertex in vertices]
+    low = np.maximum(_ways_out(edges, height, opening), height.min())
+    return [(float(height[top] - low[top]), vertices[top]) for top in tops]
 
 
 def _ways_out(edges: np.ndarray, height: np.ndarray, opening: np.ndarray) -> np.ndarray:

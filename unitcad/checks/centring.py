@@ -88,7 +88,8 @@ def _patches(cup: Manifold, base: Manifold, level: float) -> list[tuple[float, f
     found = []
     for patch in thick_parts(shared, GRID):
         depth, normal = _narrowest(patch)
-        outwards = normal if float(normal @ (_middle(patch) - middle)) > 0 else -normal
+        x0, y0, x1, y1 = patch.bounds()
+        outwards = normal if float(normal @ (np.array([x0 + x1, y0 + y1]) / 2 - middle)) > 0 else -normal
         found.append((depth / SQUARE, math.degrees(math.atan2(outwards[1], outwards[0])) % 360))
     return found
 
@@ -102,11 +103,6 @@ def _narrowest(patch: CrossSection) -> tuple[float, np.ndarray]:
     along = hull @ normals.T
     extents = along.max(axis=0) - along.min(axis=0)
     return float(extents.min()), normals[int(extents.argmin())]
-
-
-def _middle(patch: CrossSection) -> np.ndarray:
-    x0, y0, x1, y1 = patch.bounds()
-    return np.array([x0 + x1, y0 + y1]) / 2
 
 
 def _faces(directions: Iterator[float]) -> list[float]:

@@ -20,7 +20,7 @@ from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.kernels.mesh import bounds, swept_up, thick_pieces
 from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.pieces import CAST, Removal, Way
+from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
 
 BLOCKED = 1e-5
@@ -38,7 +38,8 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             where = f"pour {step.index}: {removal.piece}{removal.part and f' {removal.part}'} out"
             cast = removal.piece == CAST
             if cast and not silicone.is_empty():
-                piece, rest = _parted(moulds, silicone, removal)
+                within = removal.within
+                piece, rest = silicone.split(moulds.mesh_of(within)) if within else (silicone, Manifold())
                 if not thick_pieces(piece):
                     yield _out_of_order(where, "there is no silicone where this part should be")
                     continue
@@ -60,14 +61,6 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             part = f"{silicone.volume():.3g} mm3 of the silicone"
             yield _out_of_order(f"pour {step.index}: {part} stay", "no removed part carries them")
         yield from _left(moulds, step, after, there, cast=not silicone.is_empty())
-
-
-def _parted(moulds: MouldSet, silicone: Manifold, removal: Removal) -> tuple[Manifold, Manifold]:
-    """Return the part of the silicone that a removal takes, and the rest."""
-    if removal.within is None:
-        return silicone, Manifold()
-    part, rest = silicone.split(moulds.mesh_of(removal.within))
-    return part, rest
 
 
 def _left(

@@ -95,7 +95,8 @@ def _findings(where: str, there: _There, facets: float, known: dict[tuple[str, s
     pairs = []
     boxes = [np.array([solid.bounding_box() for solid in parts]) for _, parts in there]
     for ((a, parts), own), ((b, others), beside) in combinations(zip(there, boxes, strict=True), 2):
-        meeting = np.argwhere(_meet(own, beside))
+        apart = (own[:, None, :3] > beside[None, :, 3:]) | (beside[None, :, :3] > own[:, None, 3:])
+        meeting = np.argwhere(~apart.any(axis=2))
         if not len(meeting):
             continue
         if (a, b) not in known:
@@ -118,12 +119,6 @@ def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
         opinions = (thick_pieces(solid, facets) for solid in (shared, other ^ one))
         return min(sum(float(piece.volume()) for piece in pieces) for pieces in opinions)
     return min(volume, float((other ^ one).volume()), float(other.volume() - (other - one).volume()))
-
-
-def _meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell for every two of two sets of boxes (n, 6) and (m, 6) whether they touch."""
-    low, high = boxes[:, None, :3], boxes[:, None, 3:]
-    return np.all((low <= others[None, :, 3:]) & (others[None, :, :3] <= high), axis=2)
 
 
 CHECK = MouldCheck("C200", "overlap: no two solids of an assembled step share volume", findings)

@@ -32,7 +32,10 @@ THIN = 1e-3
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Look at the size of the pieces, at every seam of a split tool, then at the silicone in the seams of each pour."""
     yield _largest(moulds)
-    gaps = {split.tool: _gap(moulds, split) for split in moulds.plan.splits}
+    gaps = {
+        split.tool: moulds.solids[split.tool] - united(moulds.mesh(piece) for piece in split.pieces)
+        for split in moulds.plan.splits
+    }
     for split in moulds.plan.splits:
         yield from _of_split(moulds, split, gaps[split.tool])
     for step in moulds.plan.steps:
@@ -60,11 +63,6 @@ def _largest(moulds: MouldSet) -> MouldFinding:
     return at_most("C250", f"{name} on the bed", length, room + 1e-6, "mm", "it is larger than the printer's bed")
 
 
-def _gap(moulds: MouldSet, split: Split) -> Manifold:
-    """Return the difference of a tool and its pieces."""
-    return moulds.solids[split.tool] - united(moulds.mesh(piece) for piece in split.pieces)
-
-
 def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFinding]:
     """Look at overlap, gap and way in of neighbouring pieces, at the widest gap, and at material outside the tool."""
     whole, pieces = moulds.solids[split.tool], [(piece.name, moulds.mesh(piece)) for piece in split.pieces]
@@ -82,15 +80,11 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
         yield at_least("C250", f"{where}: narrowest gap", narrowest, least - GRID, "mm", too_tight(lengths))
         caught = min(sum(blocked(other, {name: piece}, (0, 0, way)).values()) for way in (1, -1))
         yield at_most("C250", f"{where}: slide together", caught, BLOCKED, "mm3", "one piece is caught in the other")
-    missing = "something of the tool is missing"
-    yield at_most("C250", f"{split.tool}: widest gap", _widest(gap), play + GRID, "mm", missing)
-
-
-def _widest(gap: Manifold) -> float:
-    """Return the diameter of the largest circle in any level section of a gap, mm."""
     heights = sorted({float(z) for z in arrays(gap)[0][:, 2]}) if not gap.is_empty() else []
     levels = [(low + high) / 2 for low, high in pairwise(heights) if high - low > THIN]
-    return max((_inscribed(gap.slice(level)) for level in levels), default=0.0)
+    widest = max((_inscribed(gap.slice(level)) for level in levels), default=0.0)
+    missing = "something of the tool is missing"
+    yield at_most("C250", f"{split.tool}: widest gap", widest, play + GRID, "mm", missing)
 
 
 def _inscribed(section: CrossSection) -> float:

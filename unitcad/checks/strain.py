@@ -24,7 +24,6 @@ from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
-from unitcad.shape import Shape
 from unitcad.spec import Spec
 
 FOOT = 1e-3
@@ -97,7 +96,8 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     a direction of its own: the parts of cells are the first ones that are taken out.
     """
     lay, base = moulds.plan.layout, moulds.solids[moulds.plan.base_of(step)]
-    shapes, cells, ways = (*step.earlier, *step.layer), len(lay.cells), _ways(step)
+    shapes, cells = (*step.earlier, *step.layer), len(lay.cells)
+    ways = [(each.within, each.direction) for each in step.removals if each.piece == CAST and each.within]
     if len(step.layer) == cells and not ways:
         bodies = [united(moulds.meshes(shapes[i::cells])) for i in range(cells)]
         return [Peel(body, base) for body in bodies]
@@ -109,11 +109,6 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
     bodies = [whole ^ column.translate((c.x, c.y, 0)) for c in lay.cells]
     return [Peel(body, base) for body in bodies]
-
-
-def _ways(step: Step) -> list[tuple[Shape, Way]]:
-    """Return the parts of the silicone that leave in ways of their own: the space of each, and its way."""
-    return [(each.within, each.direction) for each in step.removals if each.piece == CAST and each.within]
 
 
 def _turned(part: Manifold, base: Manifold, direction: Way) -> Peel:

@@ -15,7 +15,6 @@ from unitcad.checks.finding import GRID, MouldCheck, MouldFinding, at_least
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.plan import Step
 
 SHOWN = 2.0
 """Walls thicker than this times the limit are not told apart."""
@@ -23,9 +22,13 @@ SHOWN = 2.0
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the thinnest wall between two hollows of every cup."""
-    letters = moulds.spec.moulds.engraving_depth_mm + GRID
+    lengths = moulds.spec.moulds
+    letters = lengths.engraving_depth_mm + GRID
     for step in moulds.plan.steps:
-        limit, solid = _limit(moulds, step), moulds.solids[moulds.plan.walled(step)]
+        solid = moulds.solids[moulds.plan.walled(step)]
+        limit = min(lengths.least_wall_mm, lengths.land_mm) - GRID
+        if step.groove:  # under a low rim its floor may be thinner
+            limit = min(limit, step.rim - groove_depth_of(moulds.spec, step.rim) - GRID)
         farthest = SHOWN * limit
         deep = [
             piece for piece in thick_pieces(solid.hull() - solid) if (box := piece.bounding_box())[5] - box[2] > letters
@@ -36,13 +39,6 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         yield at_least(
             "C240", f"{moulds.plan.walled(step)}: wall between two hollows", thinnest, limit, "mm", "move them apart"
         )
-
-
-def _limit(moulds: MouldSet, step: Step) -> float:
-    """Return the least wall, mm: the printer's, or a narrower land; under a low rim a groove's floor may be thinner."""
-    lengths = moulds.spec.moulds
-    least = min(lengths.least_wall_mm, lengths.land_mm) - GRID
-    return min(least, step.rim - groove_depth_of(moulds.spec, step.rim) - GRID) if step.groove else least
 
 
 def near(pieces: Sequence[Manifold], gap: float) -> list[tuple[int, int]]:

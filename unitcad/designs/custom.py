@@ -114,7 +114,9 @@ def _with_checks(name: str, field: str, function: Callable[..., Any]) -> Callabl
         except (Exception, SystemExit) as error:
             raise _error_at_line(name, error) from None
         if field == "dimensions" and not fault:
-            fault = _wrong_count(made, given[0])
+            counts, wanted = (len(made.radii), len(made.heights)), len(given[0].layers)
+            if counts != (wanted, wanted):
+                fault = f"dimensions has {counts[0]} radii and {counts[1]} heights, not {wanted} each"
         if fault:
             raise UnitcadError(f"design {name}: {fault}")
         return dict(made) if field == "layers" else made
@@ -133,17 +135,6 @@ def _wrong_shapes(made: Any) -> str:
         if not isinstance(shape, get_args(Shape)):
             return f"{name} is a {type(shape).__name__}, not a shape tree"
     return ""
-
-
-def _wrong_count(dims: Dimensions, spec: Spec) -> str:
-    wanted = len(spec.layers)
-    if (len(dims.radii), len(dims.heights)) == (wanted, wanted):
-        return ""
-    return f"dimensions has {len(dims.radii)} radii and {len(dims.heights)} heights, not {wanted} each"
-
-
-def _texts(made: Any) -> Any:
-    return [getattr(each, "text", each) for each in made] if isinstance(made, list | tuple) else made
 
 
 def _wrong_texts(field: str, many: int = 0) -> Callable[[Any], str]:
@@ -169,7 +160,9 @@ _EXPECTED: dict[str, Callable[[Any], str]] = {
     "advice": _wrong_texts("advice"),
     "pad_radius": _wrong_kind("pad_radius", int | float, "a number"),
     "tooling": _wrong_kind("tooling", Tooling, "a Tooling"),
-    "assembly": lambda made: _wrong_texts("assembly")(_texts(made)),
+    "assembly": lambda made: _wrong_texts("assembly")(
+        [getattr(each, "text", each) for each in made] if isinstance(made, list | tuple) else made
+    ),
     "skipped": _wrong_texts("skipped", many=2),
 }
 """For each function of a Design, a check of its result: the fault as text, "" for none."""

@@ -73,22 +73,6 @@ class Tooling:
         return f"Tooling({', '.join(tool.name for tool in self.tools)})"
 
 
-def _no_limits(spec: Spec, dims: Dimensions) -> None:
-    """Accept every spec."""
-
-
-def _nothing(spec: Spec, dims: Dimensions) -> list[str]:
-    return []
-
-
-def _nothing_skipped(spec: Spec) -> list[Reason]:
-    return []
-
-
-def _inside_cavity(asked: RawSpec, inner_radius: float) -> float:
-    return inner_radius - 0.3
-
-
 @dataclass(frozen=True)
 class Fitting:
     """A sentence of the assembly, and the tools of its step.
@@ -137,9 +121,9 @@ class Design:
     about: str
     layers: Callable[[Spec, Dimensions], Mapping[str, Shape]]
     dimensions: Callable[[Spec], Dimensions]
-    limits: Callable[[Spec, Dimensions], None] = _no_limits
-    advice: Callable[[Spec, Dimensions], list[str]] = _nothing
-    pad_radius: Callable[[RawSpec, float], float] = _inside_cavity
+    limits: Callable[[Spec, Dimensions], None] = lambda spec, dims: None
+    advice: Callable[[Spec, Dimensions], list[str]] = lambda spec, dims: []
+    pad_radius: Callable[[RawSpec, float], float] = lambda asked, inner_radius: inner_radius - 0.3
     wire_sides: int = 1
     tooling: Literal["concentric", "complement"] | Callable[[Spec, Sequence[Shape]], Tooling] = "complement"
     suction: bool = False
@@ -147,8 +131,8 @@ class Design:
     laid_in: int = 0
     caps: bool = False
     passes: float | None = None
-    assembly: Callable[[Spec, Dimensions], Sequence[str | Fitting]] = _nothing
-    skipped: Callable[[Spec], list[Reason]] = _nothing_skipped
+    assembly: Callable[[Spec, Dimensions], Sequence[str | Fitting]] = lambda spec, dims: []
+    skipped: Callable[[Spec], list[Reason]] = lambda spec: []
     default: bool = False
 
 

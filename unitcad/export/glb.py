@@ -90,7 +90,11 @@ def content(parts: Sequence[GlbPart]) -> bytes:
         meshes.append({"name": part.name, "primitives": [primitive]})
         materials.append(_material(part))
         node = {"name": part.name, "mesh": len(meshes) - 1, "extras": dict(sorted(part.extras.items()))}
-        nodes += [{**node, "name": place.name, **_placement(place)} for place in part.places] or [node]
+        for place in part.places:
+            half = math.radians(place.angle_deg) / 2
+            turn = {"rotation": [0.0, 0.0, math.sin(half), math.cos(half)]} if place.angle_deg else {}
+            nodes.append({**node, "name": place.name, **turn, "translation": [place.x, place.y, 0.0]})
+        nodes += [] if part.places else [node]
     root = {
         "name": "assembly",
         "children": list(range(1, len(nodes) + 1)),
@@ -154,13 +158,6 @@ def _pairs_round(vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _unit(vectors: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)
-
-
-def _placement(place: Standing) -> dict[str, Any]:
-    """Return a node's translation (mm) and rotation (a quaternion, the real part last)."""
-    half = math.radians(place.angle_deg) / 2
-    turn = {"rotation": [0.0, 0.0, math.sin(half), math.cos(half)]} if place.angle_deg else {}
-    return {**turn, "translation": [place.x, place.y, 0.0]}
 
 
 def _material(part: GlbPart) -> dict[str, Any]:

@@ -82,7 +82,9 @@ def _curved_area(leaf: Revolve | Extrude) -> float:
             )
             return flat + 2 * math.pi * profile.bounds[2] * sum(length for _, length in _arcs(profile))
         case Extrude(z0=z0, z1=z1):
-            lean = _lean(leaf)
+            # The farthest that a taper's corner moves sideways on its way up.
+            corners = zip(leaf.profile.vertices, (leaf.top or leaf.profile).vertices, strict=True)
+            lean = max(math.dist(low[:2], high[:2]) for low, high in corners)
             return math.hypot(z1 - z0, lean) * sum(
                 length for profile in _outlines(leaf) for _, length in _arcs(profile)
             )
@@ -90,12 +92,6 @@ def _curved_area(leaf: Revolve | Extrude) -> float:
 
 def _outlines(leaf: Extrude) -> tuple[Profile, ...]:
     return (leaf.profile, *leaf.holes, *([leaf.top] if leaf.top else []))
-
-
-def _lean(leaf: Extrude) -> float:
-    """Return the farthest (mm) that a taper's corner moves sideways on its way up."""
-    above = leaf.top.vertices if leaf.top else leaf.profile.vertices
-    return max(math.dist(low[:2], high[:2]) for low, high in zip(leaf.profile.vertices, above, strict=True))
 
 
 def _arcs(profile: Profile) -> Iterator[tuple[float, float]]:

@@ -1,4 +1,5 @@
-"""Shape to boundary representation, by any library that is passed in. No library is loaded here.
+"""Shape to boundary representation, by the library that is passed in: a module with the functions of `occt` (`line` to
+`place`). No library is loaded here.
 
 The result is exact: arcs are arcs, and every volume is OCCT's to about 1e-12. A node is one boolean with all its tools
 in one list, which OCCT's general fuse does several times faster than one after the other.
@@ -6,44 +7,24 @@ in one list, which OCCT's general fuse does several times faster than one after 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterable
+from typing import Any
 
 from unitcad.kernels.mesh import arrays, corners_and_faces
 from unitcad.kernels.mesh import realise as meshed
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, arc_middle, sides
-from unitcad.shape.tree import Turn
 
 Point = tuple[float, float, float]
 
 
-class Library(Protocol):
-    """The functions of a B-rep library; a module with these functions is one. Lengths in mm."""
-
-    def line(self, start: Point, end: Point, /) -> Any: ...
-    def arc(self, start: Point, middle: Point, end: Point, /) -> Any: ...
-    def wire(self, edges: Sequence[Any], /) -> Any: ...
-    def face(self, outer: Any, holes: Sequence[Any], /) -> Any: ...
-    def revolve(self, face: Any, /) -> Any: ...
-    def extrude(self, face: Any, height: float, /) -> Any: ...
-    def loft(self, below: Any, above: Any, /) -> Any: ...
-    def polyhedron(self, corners: Sequence[Point], faces: Sequence[Sequence[int]], /) -> Any: ...
-    def fuse(self, parts: Sequence[Any], /) -> Any: ...
-    def cut(self, body: Any, tools: Sequence[Any], /) -> Any: ...
-    def common(self, one: Any, other: Any, /) -> Any: ...
-    def component(self, solid: Any, at: Point, /) -> Any: ...
-    def below(self, solid: Any, bottom: float, /) -> Any: ...
-    def place(self, solid: Any, turn: Turn, move: Point, /) -> Any: ...
-
-
-def realise(shapes: Iterable[Shape], library: Library) -> list[Any]:
+def realise(shapes: Iterable[Shape], library: Any) -> list[Any]:
     """Return the solids of `shapes` in `library`; common parts are built once."""
     known: dict[Shape, Any] = {}
     return [_solid(shape, library, known) for shape in shapes]
 
 
-def _solid(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
+def _solid(shape: Shape, library: Any, known: dict[Shape, Any]) -> Any:
     if shape not in known:
         known[shape] = _built(shape, library, known)
     return known[shape]
@@ -63,7 +44,7 @@ def _is_faceted(shape: Shape) -> bool:
     return _is_faceted(shape.shape)
 
 
-def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
+def _built(shape: Shape, library: Any, known: dict[Shape, Any]) -> Any:
     if not isinstance(shape, Polyhedron) and _is_faceted(shape):
         # OCCT takes minutes for booleans of thousands of faces.
         corners, faces = arrays(meshed(shape, 3))
@@ -98,11 +79,11 @@ def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
     raise TypeError(f"not a shape: {shape!r}")
 
 
-def _level(profile: Profile, z: float, library: Library) -> Any:
+def _level(profile: Profile, z: float, library: Any) -> Any:
     return _wire(profile, lambda x, y: (x, y, z), library)
 
 
-def _wire(profile: Profile, lift: Any, library: Library) -> Any:
+def _wire(profile: Profile, lift: Any, library: Any) -> Any:
     edges = []
     for start, end in sides(profile.vertices):
         ends = lift(*start[:2]), lift(*end[:2])

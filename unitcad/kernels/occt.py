@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from unitcad.errors import UnitcadError
 from unitcad.kernels import brep, mesh
@@ -58,22 +57,11 @@ _FLAT = 1e-9
 """Distance from a line or a plane up to which points count as on it, mm."""
 
 
-@dataclass(frozen=True)
-class Measures:
-    """Measures that kernels can be compared by, in mm, mm2 and mm3; the box as (x0, y0, z0, x1, y1, z1)."""
-
-    solids: int
-    volume: float
-    area: float
-    box: tuple[float, ...]
-    centre: tuple[float, ...]
-
-
 def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
     """Return the bodies of `shapes`, faces that continue each other merged; those of one shape are partners."""
     chains = [_unplaced(shape) for shape in shapes]
     distinct = list(dict.fromkeys(inner for inner, _ in chains))
-    made = brep.realise(distinct, sys.modules[__name__])  # type: ignore[arg-type]
+    made = brep.realise(distinct, sys.modules[__name__])
     merged = dict(zip(distinct, map(_unified, made), strict=True))
     placed = []
     for inner, places in chains:
@@ -110,17 +98,15 @@ def confirm(shape: Shape, solid: TopoDS_Shape) -> None:
         )
 
 
-def measure(solid: TopoDS_Shape) -> Measures:
-    """Return the measures of a body; the box is that of the surfaces themselves, to about 1e-7 mm."""
-    inside, surface = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(solid, inside, 1e-12)
-    BRepGProp.SurfaceProperties_s(solid, surface, 1e-12)
-    centre = inside.CentreOfMass()
-    place = (centre.X(), centre.Y(), centre.Z())
-    return Measures(len(solids_in(solid)), inside.Mass(), surface.Mass(), _box(solid), place)
+def volume(solid: TopoDS_Shape) -> float:
+    """Return the volume of a body, mm3, to about 1e-12 of it."""
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, properties, 1e-12)
+    return properties.Mass()
 
 
-def _box(solid: TopoDS_Shape) -> tuple[float, ...]:
+def box_of(solid: TopoDS_Shape) -> tuple[float, ...]:
+    """Return the box of a body's surfaces themselves, to about 1e-7 mm: (x0, y0, z0, x1, y1, z1)."""
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(solid, box, False, False)
     box.SetGap(0.0)
@@ -241,7 +227,7 @@ def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
 
 def below(solid: TopoDS_Shape, bottom: float) -> TopoDS_Shape:
     """Return the prisms under the upward faces, fused: exact where each such face is seen whole from above."""
-    x0, y0, _, x1, y1, high = _box(solid)
+    x0, y0, _, x1, y1, high = box_of(solid)
     down = gp_Vec(0, 0, bottom - 1 - high)
     prisms = [BRepPrimAPI_MakePrism(each, down, True).Shape() for each in faces_of(solid) if _faces_up(each)]
     under = BRepPrimAPI_MakeBox(gp_Pnt(x0 - 1, y0 - 1, bottom), gp_Pnt(x1 + 1, y1 + 1, high + 1)).Shape()

@@ -86,14 +86,8 @@ def _block_round(solids: Sequence[Manifold], top: float) -> Manifold:
 def _holding(layer: Manifold, drawn: Manifold, components: Iterable[Manifold]) -> Manifold:
     """Return the component that is the layer and its channels as drawn, or has most of the layer; otherwise nothing."""
     near = [component for component in components if boxes_meet(component, layer)]
-    found = next((component for component in near if _alike(component, drawn)), None)
-    return found or max(
-        near, key=lambda component: (component ^ layer).volume() if len(near) > 1 else 1.0, default=Manifold()
-    )
-
-
-def _alike(a: Manifold, b: Manifold) -> bool:
-    """Tell whether volume and bounding box are the same: only one component of a pour can be so."""
-    if abs(a.volume() - b.volume()) > BALANCE * b.volume():
-        return False
-    return all(abs(p - q) < _SAME_MM for p, q in zip(a.bounding_box(), b.bounding_box(), strict=True))
+    for component in near:  # only one component of a pour can have that volume and that box
+        box_off = np.abs(np.subtract(component.bounding_box(), drawn.bounding_box())).max()
+        if abs(component.volume() - drawn.volume()) <= BALANCE * drawn.volume() and box_off < _SAME_MM:
+            return component
+    return max(near, key=lambda component: (component ^ layer).volume() if len(near) > 1 else 1.0, default=Manifold())

@@ -66,16 +66,12 @@ def _fill(spec: Spec, dims: Dimensions, most_columns: int, most_rows: int) -> tu
     best = 1, 1
     for columns in range(1, most_columns + 1):
         # One more column leaves room for no more rows.
-        while rows and not _fits(spec, dims, columns, rows):
+        while rows and (columns * rows > MOST_CELLS or max(_excess(spec, _layout(spec, dims, columns, rows))) > 1e-9):
             rows -= 1
         if not rows:
             break
         best = max(best, (columns, rows), key=lambda split: (math.prod(split), split))
     return best
-
-
-def _fits(spec: Spec, dims: Dimensions, columns: int, rows: int) -> bool:
-    return columns * rows <= MOST_CELLS and max(_excess(spec, _layout(spec, dims, columns, rows))) <= 1e-9
 
 
 def _excess(spec: Spec, lay: Layout) -> list[float]:
@@ -99,7 +95,13 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     splay = moulds.plinth_height_mm * math.tan(math.radians(PLINTH_DRAFT_DEG))
     foot = plinth[0] + splay, plinth[1] + splay
     skirt = moulds.plinth_clearance_mm + moulds.skirt_wall_mm
-    corner = _corner_for_label(reach + _off_groove(spec, dims), text_width("00", stroke), label)
+    # Letters as deep as a low rim's groove leave a wall between the two.
+    deep = any(groove_depth_of(spec, rim) <= moulds.engraving_depth_mm + EPS for rim in dims.heights)
+    clear = reach + (max(_LABEL_GAP, moulds.least_wall_mm) if deep else _LABEL_GAP)
+    # The least half side of a square about a cell whose corner has room for a label outside that radius.
+    corner, text = clear / math.sqrt(2), (text_width("00", stroke) + TEXT_MARGIN, label + TEXT_MARGIN)
+    while math.hypot(max(corner - text[0], 0), max(corner - text[1], 0)) < clear:
+        corner += 1 / 64
     # The numbers of the last column and row are outside its bores too, and behind the cut corner.
     beside = [pitch / 2 + size + MARK / 2 + 0.1 if digits else 0.0 for size in number]
     cup = max(foot[0] + skirt, half[0] + max(corner, beside[0])), max(foot[1] + skirt, half[1] + max(corner, beside[1]))
@@ -108,7 +110,8 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
         Cell(
             (i - (columns - 1) / 2) * pitch,
             (j - (rows - 1) / 2) * pitch,
-            _sides(dims, i, columns),
+            # In two columns with one tail each, the left one's leaves to the left.
+            (-1,) if dims.sides == (1,) and columns == 2 and i == 0 else dims.sides,
             f"{j * columns + i + 1:0{digits}X}" if digits else "",
         )
         for j in range(rows)
@@ -118,30 +121,10 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     return Layout(cells, key, pitch, plinth, cup, (cup[0] + margin, cup[1] + margin), label)
 
 
-def _sides(dims: Dimensions, column: int, columns: int) -> tuple[int, ...]:
-    """Return the exits of a cell's tails: in two columns with one tail each, the left one's leaves to the left."""
-    return (-1,) if dims.sides == (1,) and columns == 2 and column == 0 else dims.sides
-
-
-def _off_groove(spec: Spec, dims: Dimensions) -> float:
-    """Return a corner label's distance from the groove, mm: letters as deep as a low rim's groove leave a wall."""
-    lengths = spec.moulds
-    deep = any(groove_depth_of(spec, rim) <= lengths.engraving_depth_mm + EPS for rim in dims.heights)
-    return max(_LABEL_GAP, lengths.least_wall_mm) if deep else _LABEL_GAP
-
-
 def groove_depth_of(spec: Spec, rim: float) -> float:
     """Return the depth of an overflow groove: the printer's, or half a low rim's height, down to a whole layer."""
     depth, layer = min(spec.moulds.groove_depth_mm, rim / 2), spec.moulds.layer_mm
     return math.floor(depth / layer + EPS) * layer if depth >= layer else depth
-
-
-def _corner_for_label(radius: float, width: float, height: float) -> float:
-    """Return the least half side of a square about a cell whose corner has room for a label outside `radius`."""
-    half = radius / math.sqrt(2)
-    while math.hypot(max(half - TEXT_MARGIN - width, 0), max(half - TEXT_MARGIN - height, 0)) < radius:
-        half += 1 / 64
-    return half
 
 
 def _too_tall(spec: Spec, tallest: float) -> Refusal:

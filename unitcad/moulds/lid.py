@@ -219,7 +219,7 @@ def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
     """
     inner, outer = _ceiling(dims, layer)
     width = GATE * (outer - inner)
-    if _at_the_rim(dims, layer):
+    if dims.exit and dims.exit.high >= dims.heights[layer]:
         # The tongue parts the ring: air would be trapped next to it, whatever the number of vents.
         raise Refusal("moulds.pour", "injected", "wires that leave at the rim need an open pour", "open")
     if inner and width < LEAST_VENT - 1e-9:
@@ -262,10 +262,6 @@ def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
     """Return inner and outer radius of the flat top of a layer; the inner one is 0 for a cap."""
     inside, top = dims.outside(layer - 1)[-1]
     return (inside if top >= dims.heights[layer] else 0.0), dims.rim_radius(layer)
-
-
-def _at_the_rim(dims: Dimensions, layer: int) -> bool:
-    return dims.exit is not None and dims.exit.high >= dims.heights[layer]
 
 
 FLOOR_MM = 2.0

@@ -91,11 +91,14 @@ class Variant(MouldSet):
             raise unknown_name("library", str(library), ("manifold3d", "trimesh"))
         if not isinstance(body, Body | str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise WrongArgument("body", body, "takes a body's name or a Body")
-        solid = super().mesh(self._body(body) if isinstance(body, str) else body)
-        if library == "manifold3d":
-            return solid
-
-        return as_trimesh(solid)
+        if isinstance(body, str):
+            of_unit = {body.name: body for body in self.unit}
+            known = of_unit if body in of_unit else self.bodies  # the moulds are drawn only for a tool
+            if body not in known:
+                raise unknown_name("body", body, known)
+            body = known[body]
+        solid = super().mesh(body)
+        return solid if library == "manifold3d" else as_trimesh(solid)
 
     def to_build123d(self) -> Any:
         """Return unit and moulds as a named, coloured build123d Compound, mm. Raises UnitcadError without the extra."""
@@ -134,10 +137,3 @@ class Variant(MouldSet):
         head = ("layer", "material", "volume, mm³", "mass, g")
         drawn = text.drawing(self.section(), f"section of {self.spec.name}")
         return drawn + text.table(head, rows, self.spec.summary)
-
-    def _body(self, name: str) -> Body:
-        """Return the unit's body of that name, else the tool's: the moulds are drawn only for a tool."""
-        of_unit = {body.name: body for body in self.unit}
-        if name not in of_unit and name not in self.bodies:
-            raise unknown_name("body", name, self.bodies)
-        return of_unit.get(name) or self.bodies[name]

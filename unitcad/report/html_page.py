@@ -40,7 +40,10 @@ class Pool:
         """Return `data` (of JSON's types) with every larger part replaced by a reference."""
         if not isinstance(data, dict | list | tuple | str):
             return data
-        text = _encode(data)
+        try:
+            text = _ENCODER.encode(data)
+        except UnicodeEncodeError:  # names of files that are no text
+            text = json.dumps(data).encode()
         if len(text) < LEAST:
             return data
         if text not in self._index:
@@ -51,14 +54,6 @@ class Pool:
             self._index[text] = len(self.entries)
             self.entries.append(data)
         return {REFERENCE: self._index[text]}
-
-
-def _encode(data: Any) -> bytes:
-    """Return data as JSON, by the encoder that is ten times as fast as Python's if it can write all of it."""
-    try:
-        return _ENCODER.encode(data)
-    except UnicodeEncodeError:  # names of files that are no text
-        return json.dumps(data).encode()
 
 
 _EFFORT = 6

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -32,7 +31,8 @@ def extent(shape: Shape, turn: Turn = UNTURNED, move: Point = (0.0, 0.0, 0.0)) -
     """Return a box around a shape, turned and then moved: (x0, y0, z0, x1, y1, z1), mm; round all that cuts leave."""
     match shape:
         case Place():
-            return extent(shape.shape, _both(turn, shape.turn), _transform(turn, shape.move, move))
+            columns = [_transform(turn, column, (0.0, 0.0, 0.0)) for column in zip(*shape.turn, strict=True)]
+            return extent(shape.shape, tuple(zip(*columns, strict=True)), _transform(turn, shape.move, move))
         case Cut(body, _):
             return extent(body, turn, move)
         case Union(parts) | Common(parts):
@@ -40,16 +40,6 @@ def extent(shape: Shape, turn: Turn = UNTURNED, move: Point = (0.0, 0.0, 0.0)) -
             inner, outer = (np.max, np.min) if isinstance(shape, Common) else (np.min, np.max)
             return *inner(boxes[:, :3], axis=0).tolist(), *outer(boxes[:, 3:], axis=0).tolist()
     return _placed_box(_box_of(shape), turn, move)
-
-
-def _both(turn: Turn, first: Turn) -> Turn:
-    """Return the rotation `first`, then `turn`."""
-    a, b, c = (tuple(row[i] for row in first) for i in range(3))
-    return tuple((_dot(row, a), _dot(row, b), _dot(row, c)) for row in turn)
-
-
-def _dot(row: Sequence[float], column: Sequence[float]) -> float:
-    return sum(one * other for one, other in zip(row, column, strict=True))
 
 
 @lru_cache(maxsize=4096)

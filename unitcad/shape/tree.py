@@ -328,7 +328,10 @@ def copies(bodies: Sequence[Body]) -> list[list[int]]:
     """Return the places in the list of bodies that differ by name and a move alone: as they are printed, one solid."""
     found: dict[object, list[int]] = {}
     for i, body in enumerate(bodies):
-        like = (_unmoved(body.shape), body.kind, body.step, body.colour, body.made, body.upside_down)
+        shape = body.shape
+        while isinstance(shape, Place) and shape.turn == UNTURNED:
+            shape = shape.shape
+        like = (shape, body.kind, body.step, body.colour, body.made, body.upside_down)
         found.setdefault(like, []).append(i)
     return list(found.values())
 
@@ -344,10 +347,3 @@ def part_names(bodies: Sequence[Body], parts: Sequence[Sequence[int]]) -> list[s
         names.append(first.name if len(part) == 1 else next(name for name in several if name not in others))
         taken.add(names[-1])
     return names
-
-
-def _unmoved(shape: Shape) -> Shape:
-    """Return a shape before the last moves that turned nothing."""
-    while isinstance(shape, Place) and shape.turn == UNTURNED:
-        shape = shape.shape
-    return shape

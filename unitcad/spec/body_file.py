@@ -17,7 +17,6 @@ from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.files import LARGEST, read
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.file_checks import check_file
-from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.readers.read_3mf import read_build
 from unitcad.meshcheck.readers.read_step import step_bodies
 from unitcad.meshcheck.readers.threemf_package import open_package
@@ -48,12 +47,12 @@ def body_text(design: str, path: Path) -> str:
         raise Refusal("design", design, str(error)) from None
     # The solids of an assembly may share volume: the inner ones are cut out of a layer.
     report = check_file(path, Options(ignore=("G002",)) if _is_step(path) else Options())
-    scale = s_scale.likely_unit(report.facts, None) if readers.kind_of(path.name) == "step" else ()
+    scale = s_scale.likely_unit(report.facts, None) if _is_step(path) else ()
     for finding in (*report.findings, *scale):
         if finding.code == F011.code:
             raise Unfinished(f"{path}: its check was not finished: {finding.message}")
         if finding.severity == "error" or finding.code == s_scale.S001.code:
-            raise Refusal("design", design, _sentence(finding))
+            raise Refusal("design", design, f"{finding.code}: {finding.message}")
     try:
         bodies = _bodies(path)
     except Unfinished:
@@ -92,10 +91,6 @@ def bodies_in(design: str, text: str) -> dict[str, Polyhedron]:
 
 def _is_step(path: Path) -> bool:
     return readers.kind_of(path.name) == "step"
-
-
-def _sentence(finding: Finding) -> str:
-    return f"{finding.code}: {finding.message}"
 
 
 def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:

@@ -158,7 +158,7 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
         names = [_name(plain, kind) for plain in _NAMES if plain in known]
         limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
         meant = (
-            _in_list(value, kind)
+            [value] * _length(kind)  # a single value may be meant as the list
             if list in known
             else _number(value, field)
             if known & {int, float}
@@ -174,7 +174,10 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     most = [note.max_length for note in notes(kind) if note.max_length is not None]
     least = [note.min_length for note in notes(kind) if note.min_length is not None]
     if not value and not fixed:
-        return Refusal(field, value, _needs(kind))
+        content = named_in(kind) or entry_in(kind)
+        entries = f"one or more of {', '.join(_words(content))}" if content and _words(content) else ""
+        needed = entries or meaning(kind) or ("one entry or more" if content else "one character or more")
+        return Refusal(field, value, f"must not be empty: needs {needed}")
     things = "characters" if given is str else "entries"
     if least and len(value) < least[0]:
         return Refusal(field, value, f"must have at least {least[0]} {things}")
@@ -256,20 +259,6 @@ def _number(value: Any, field: str) -> float | None:
         return None
     number = float(parts[1].replace(",", ".")) * (_MM.get(unit, 1) if own == "mm" else 1)
     return int(number) if number.is_integer() else number if math.isfinite(number) else None
-
-
-def _in_list(value: Any, kind: Any) -> list[Any] | None:
-    """Return a single value as the list that was meant; None if it is no entry."""
-    listed = [value] * _length(kind)
-    return listed if _fits(listed, kind) else None
-
-
-def _needs(kind: Any) -> str:
-    """Describe the content that an empty text, list or table needs."""
-    entry = named_in(kind) or entry_in(kind)
-    words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
-    needed = words or meaning(kind) or ("one entry or more" if entry else "one character or more")
-    return f"must not be empty: needs {needed}"
 
 
 def _fits(value: Any, kind: Any) -> bool:

@@ -33,11 +33,8 @@ def alternatives(kind: Any) -> tuple[Any, ...]:
 
 def table_in(kind: Any) -> type[msgspec.Struct] | None:
     """Return the table among the alternatives of `kind`."""
-    return next((k for k in alternatives(kind) if _is_table(typing.get_origin(k) or k)), None)
-
-
-def _is_table(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+    classes = (k for k in alternatives(kind) if isinstance(typing.get_origin(k) or k, type))
+    return next((k for k in classes if issubclass(typing.get_origin(k) or k, msgspec.Struct)), None)
 
 
 def named_in(kind: Any) -> Any:

@@ -18,7 +18,7 @@ from unitcad.errors import Refusal, UnknownKey
 from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
-from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, Format, FpcbTable, MouldsTable, RawSpec
+from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, FpcbTable, MouldsTable, RawSpec
 from unitcad.spec.resolved import CastLayer, MotorSize
 from unitcad.text import number, with_article
 
@@ -109,6 +109,9 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
     estimate = _estimate(raw, part)
     for name in (raw.estimate.tissue, *raw.tissue):
         catalogue.tissue(name, raw.tissue)
+    formats = raw.output.formats
+    if formats is None:  # without STEP if no B-rep kernel is installed
+        formats = ("step", "stl", "3mf") if find_spec("OCP") else ("stl", "3mf")
     return Spec.settled(
         **{
             **structs.asdict(raw),
@@ -120,7 +123,7 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
             ),
             "moulds": moulds,
             "estimate": estimate,
-            "output": structs.replace(raw.output, formats=_formats(raw)),
+            "output": structs.replace(raw.output, formats=formats),
         }
     )
 
@@ -206,13 +209,6 @@ def _circuit(raw: RawSpec, design: Design, motor: MotorSize) -> FpcbTable | None
     return structs.replace(fpcb, pad_diameter_mm=pad, tail_end_width_mm=end)
 
 
-def _formats(raw: RawSpec) -> tuple[Format, ...]:
-    """Return the formats asked for; by default without STEP where no B-rep kernel is installed."""
-    if raw.output.formats is not None:
-        return raw.output.formats
-    return ("step", "stl", "3mf") if find_spec("OCP") else ("stl", "3mf")
-
-
 def _estimate(raw: RawSpec, part: catalogue.Motor | None) -> EstimateTable:
     """Return what the estimate reads: the motor's frequency and amplitude where the spec gives none."""
     unknown = dict(UNKNOWN_MOTOR)
@@ -241,9 +237,19 @@ def warnings(spec: Spec, estimate: bool = True) -> list[str]:
 
     Without `estimate` those are left out that concern only the estimate.
     """
-    leads = [*_leads(spec), *_roof(spec), *(_not_estimated(spec) if estimate else ()), *_circuit_stock(spec)]
-    design = design_of(spec)
-    return [*_thin_layers(spec), *leads, *_play(spec), *design.advice(spec, design.dimensions(spec))]
+    design, found = design_of(spec), [*_thin_layers(spec), *_leads(spec), *_roof(spec)]
+    if estimate:
+        unmeasured = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
+        found += [
+            f"{key} = {mm:g} mm: no measured unit has {what}; the estimate is that of the unit without it"
+            for key, (what, mm) in unmeasured.items()
+            if mm
+        ]
+    low, high = CIRCUIT_STOCK
+    if spec.fpcb and not low <= spec.fpcb.thickness_mm <= high:
+        stock = f"flexible circuits are {low:g} to {high:g} mm thick"
+        found.append(f"fpcb.thickness_mm = {spec.fpcb.thickness_mm:g} mm: {stock}")
+    return [*found, *_play(spec), *design.advice(spec, design.dimensions(spec))]
 
 
 def _thin_layers(spec: Spec) -> list[str]:
@@ -265,13 +271,6 @@ def _leads(spec: Spec) -> list[str]:
         return []
     offer = "draw a notch for them" if drawn else "add a table [wires] with diameter_mm, or [fpcb]"
     return [f"no way out for the motor's leads: they run between unit and skin; {offer}"]
-
-
-def _not_estimated(spec: Spec) -> list[str]:
-    """Say that no measured unit has the features that the estimate does not read."""
-    found = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
-    without = "; the estimate is that of the unit without it"
-    return [f"{key} = {mm:g} mm: no measured unit has {what}{without}" for key, (what, mm) in found.items() if mm]
 
 
 def _roof(spec: Spec) -> list[str]:
@@ -318,13 +317,6 @@ def roof(spec: Spec) -> tuple[float, float]:
     stiffness = 16 * math.pi * rigidity / (span**2 * hung)
     sag = GRAVITY * kg / stiffness + pressure * span**4 / (64 * rigidity)
     return 1000 * sag, math.sqrt(stiffness / kg) / math.tau
-
-
-def _circuit_stock(spec: Spec) -> list[str]:
-    low, high = CIRCUIT_STOCK
-    if not spec.fpcb or low <= spec.fpcb.thickness_mm <= high:
-        return []
-    return [f"fpcb.thickness_mm = {spec.fpcb.thickness_mm:g} mm: flexible circuits are {low:g} to {high:g} mm thick"]
 
 
 def _play(spec: Spec) -> list[str]:

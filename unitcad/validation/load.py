@@ -198,7 +198,8 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     """
     changes = changes_of(set)
     if kind := compound_kind(source):
-        raise _is_compound(kind, source)
+        named = f"{os.fspath(source)} is" if isinstance(source, str | os.PathLike) else "this is"
+        raise UnitcadError(f"{named} an {kind.name} of units, not the spec of one: unitcad.build makes it")
     if isinstance(source, str | os.PathLike):
         data = read(source)
     elif isinstance(source, Mapping):
@@ -225,12 +226,6 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     except Refusal as first:
         every = every_fault(first, whole, lambda data: to_data(settled(data)), _sound(whole))
         raise _locate(every, data, source) from None
-
-
-def _is_compound(kind: FileKind, source: object) -> UnitcadError:
-    """Return the error for a compound in place of a single unit's spec."""
-    named = f"{os.fspath(source)} is" if isinstance(source, str | os.PathLike) else "this is"
-    return UnitcadError(f"{named} an {kind.name} of units, not the spec of one: unitcad.build makes it")
 
 
 def from_tables(keys: Mapping[str, object]) -> Spec:
