@@ -74,7 +74,11 @@ _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
     """Return the form of a spec's plain data; `spec` is the resolved one, None if the data is refused."""
-    settled = to_data(spec) if spec else _part(data)
+    settled = to_data(spec) if spec else {}
+    named = at(data, "motor.part")
+    if not spec and isinstance(named, str) and (entry := motors().get(named)):  # which a refused spec has not settled
+        sizes = {size: float(getattr(entry, size)) for size in MOTOR_SIZES}
+        settled["motor"] = sizes | ({"drive": entry.drive.value} if entry.drive else {})
     choices = choices_of(data)
     made = [Group("", "Unit", [*fields(RawSpec, "", data, settled, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
@@ -83,14 +87,6 @@ def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
             Group(f"layers.{i}", f"Layer {i + 1}", [*fields(LayerTable, f"layers.{i}", data, settled, choices)])
         )
     return [*made, *table_groups((*_TABLES, *LAST_TABLES), data, settled, choices)]
-
-
-def _part(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the sizes of the named motor, which a refused spec has not settled."""
-    named = at(data, "motor.part")
-    entry = motors().get(named) if isinstance(named, str) else None
-    sizes = {size: float(getattr(entry, size)) for size in MOTOR_SIZES if entry}
-    return {"motor": sizes | ({"drive": entry.drive.value} if entry and entry.drive else {})}
 
 
 def table_groups(
@@ -206,7 +202,7 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
     def names(name: str) -> list[tuple[str, str]]:
         return [(each, "of this spec") for each in own.get(name, {})]
 
-    found: dict[str, list[tuple[str, str]]] = {
+    return {
         "design": [(name, design.about) for name, design in shipped().items()],
         "layers.material": [*((name, _modulus(entry)) for name, entry in materials().items()), *names("materials")],
         "motor.part": [*((name, f"{number(entry.diameter_mm, 3)} mm across") for name, entry in motors().items()),
@@ -215,7 +211,6 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
                            *names("printers")],
         "estimate.tissue": [*((name, "") for name in ("forearm",) if tissue(name)), *names("tissue")],
     }  # fmt: skip
-    return found
 
 
 def _modulus(entry: Material) -> str:

@@ -67,8 +67,13 @@ class RequestGuard:
             return 403, "a request from another site"
         if len(scope["raw_path"]) + len(scope["query_string"]) > LONGEST_TARGET:
             return 414, f"an address has at most {LONGEST_TARGET} bytes"
-        keyed = self._has_folder_key(scope)
-        if not (keyed and _is_opened(headers)) and any(
+        path: str = scope["path"]
+        reads = scope["method"] == "GET" and path.startswith(FILES)
+        keyed = reads and self.keys.file(path.removeprefix(FILES)) is not None
+        said = {name: value for name, value in headers if name.startswith(b"sec-fetch-")}
+        # A browser opens a page or a download: no script or picture of a page asks for it.
+        opened = (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
+        if not (keyed and opened) and any(
             name == b"sec-fetch-site" and value in (b"cross-site", b"same-site") for name, value in headers
         ):
             return 403, "a request from another site"
@@ -82,12 +87,6 @@ class RequestGuard:
         if any(name == b"transfer-encoding" for name, _ in headers):
             return 411, "a body states its length"
         return None
-
-    def _has_folder_key(self, scope: Scope) -> bool:
-        path: str = scope["path"]
-        return (
-            scope["method"] == "GET" and path.startswith(FILES) and self.keys.file(path.removeprefix(FILES)) is not None
-        )
 
     def _has_token(self, scope: Scope, headers: list[tuple[bytes, bytes]]) -> bool:
         given = [value for name, value in headers if name == TOKEN_HEADER]
@@ -105,12 +104,6 @@ class RequestGuard:
         return any(
             key == self.cookie and hmac.compare_digest(text, self.keys.cookie.encode()) for key, _, text in parts
         )
-
-
-def _is_opened(headers: list[tuple[bytes, bytes]]) -> bool:
-    """Tell whether a browser opens a page or a download with a request: no script or picture of a page asks for it."""
-    said = {name: value for name, value in headers if name.startswith(b"sec-fetch-")}
-    return (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
 
 
 def _with_headers(send: Send) -> Send:

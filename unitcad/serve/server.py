@@ -19,9 +19,9 @@ from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import expect_none_but
 from unitcad.serve.answers import answers_about
-from unitcad.serve.application import Live, Setting, application
+from unitcad.serve.application import Live, application
 from unitcad.serve.jobs import RESULTS
-from unitcad.serve.messages import Source, Trusted
+from unitcad.serve.messages import Source
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
@@ -72,12 +72,11 @@ def serve(
             starts[name] = None
     with _listen(port) as listening:
         bound = listening.getsockname()[1]
-        setting = Setting(
+        live = Live(
             text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
-            Trusted([source for source in trusted if source.named]), starts, token, bound, batch,
+            [source for source in trusted if source.named], starts, token, bound, batch,
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
-        live = Live(setting)
         config = uvicorn.Config(
             application(live), log_level="error", access_log=False, server_header=False, date_header=False,
             timeout_keep_alive=5, timeout_graceful_shutdown=2, limit_concurrency=MOST_REQUESTS, http="h11",

@@ -30,6 +30,7 @@ from unitcad.validation.load import all_faults
 from unitcad.validation.load import judge as judge
 
 form = groups
+named_files = files_named
 as_data = to_data
 as_toml = to_toml
 faults_of = all_faults
@@ -61,11 +62,6 @@ def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted)
     return tomlkit.dumps(with_files(data, trusted)) if files_named(data) else text
 
 
-def named_files(data: Mapping[str, Any]) -> dict[str, str]:
-    """Return the values of a spec's plain data that name files, by their fields."""
-    return files_named(data)
-
-
 def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the unit's plain data, with the field of its design."""
     yield "design", data
@@ -85,7 +81,7 @@ def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
     Raises Refusal for a design's file that no trusted spec names.
     """
     named, design = files_named(data), data.get("design")
-    folders = [Path(source.folder) for source in trusted.sources if source.named == named]
+    folders = [Path(source.folder) for source in trusted if source.named == named]
     if not folders and is_custom(design) and data.get("design_source") is None:
         limit = "a design's file is read only if the spec that the server was started with names it"
         raise Refusal("design", design, limit)
