@@ -48,7 +48,8 @@ def _answered(ask: Ask, trusted: Trusted) -> Answer:
     try:
         data = parse_toml(text, "the text")
     except UnitcadError as error:
-        return Answer(text=text, faults=[Fault(str(error), line=_line_of(str(error)))])
+        place = re.match(r"the text:(\d+):", str(error))  # the line that tomllib's message names
+        return Answer(text=text, faults=[Fault(str(error), line=int(place[1]) if place else None)])
     answer = Answer(text=text, layers=len(data["layers"]) if isinstance(data.get("layers"), list) else 0)
     kind = answers_about(data)
     subject: Any = None
@@ -105,9 +106,3 @@ def _fault(error: UnitcadError) -> Fault:
             return Fault(message.partition(NEAREST)[0], error.field, line=error.line, rename=rename)
         return Fault(message, error.field, given["nearest"], error.line)
     return Fault(message)
-
-
-def _line_of(message: str) -> int | None:
-    """Return the line that tomllib's message names."""
-    place = re.match(r"the text:(\d+):", message)
-    return int(place[1]) if place else None

@@ -19,12 +19,11 @@ from starlette.routing import Route
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
-from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
-from unitcad.serve.request_guard import RequestGuard
+from unitcad.serve.request_guard import AccessKeys, RequestGuard
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 

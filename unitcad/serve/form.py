@@ -240,41 +240,38 @@ def _apply(document: Any, edit: Edit) -> None:
     *way, last = edit.path.split(".")
     node = document
     for step in way:
-        if isinstance(node, list):
+        if not isinstance(node, dict):
             node = node[_index(node, step, edit)]
-        elif isinstance(node, dict):
-            if step == "unit" and isinstance(node.get(step), str):
-                # A unit that an array names is the `like` of the table that changes it.
-                named = tomlkit.inline_table()
-                named["like"] = str(node[step])
-                named.comment(node[step].trivia.comment)
-                node[step] = named
-            if step not in node:
-                if edit.remove:
-                    return
-                node[step] = tomlkit.inline_table() if isinstance(node, InlineTable) else tomlkit.table()
-            node = node[step]
-        else:
-            raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")
-    if isinstance(node, list):
-        if edit.remove:
-            del node[_index(node, last, edit)]
-        elif isinstance(node, AoT) and not isinstance(edit.value, dict):
-            raise Refusal(edit.path, edit.value, "the entries of this list are tables")
-        elif last == str(len(node)):
-            node.append(_item(_value(edit)))
-        else:
-            node[_index(node, last, edit)] = _value(edit)
-    elif isinstance(node, dict):
+            continue
+        if step == "unit" and isinstance(node.get(step), str):
+            # A unit that an array names is the `like` of the table that changes it.
+            named = tomlkit.inline_table()
+            named["like"] = str(node[step])
+            named.comment(node[step].trivia.comment)
+            node[step] = named
+        if step not in node:
+            if edit.remove:
+                return
+            node[step] = tomlkit.inline_table() if isinstance(node, InlineTable) else tomlkit.table()
+        node = node[step]
+    if isinstance(node, dict):
         if edit.remove:
             node.pop(last, None)
         else:
             node[last] = _item(_value(edit))
+    elif edit.remove:
+        del node[_index(node, last, edit)]
+    elif isinstance(node, AoT) and not isinstance(edit.value, dict):
+        raise Refusal(edit.path, edit.value, "the entries of this list are tables")
+    elif isinstance(node, list) and last == str(len(node)):
+        node.append(_item(_value(edit)))
     else:
+        node[_index(node, last, edit)] = _value(edit)
+
+
+def _index(node: Any, step: str, edit: Edit) -> int:
+    if not isinstance(node, list):
         raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")
-
-
-def _index(node: Sequence[Any], step: str, edit: Edit) -> int:
     index = index_in(step, len(node))
     if index is None:
         raise no_entry(edit.path, edit.value, step, len(node))

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from unitcad.errors import UnitcadError
 from unitcad.files import scratch
-from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.messages import JobState
+from unitcad.serve.request_guard import AccessKeys
 from unitcad.workers import STAGES, Call, Pool, run_here
 
 MOST_KEPT = 20

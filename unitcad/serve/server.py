@@ -58,7 +58,8 @@ def serve(
     path = named_file(source or default_template(), every_template(), "spec", WrongArgument)
     text = read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
-    folder = path.parent.resolve() if is_own(source) else Path.cwd()
+    own = source is not None and is_path(source) and source not in custom_templates()
+    folder = path.parent.resolve() if own else Path.cwd()
     if not compound_kind(data):
         expect_none_but("spec", data, str(path), "spec", WrongArgument)
     trusted = [_trusted_source(data, path, code)]
@@ -73,7 +74,7 @@ def serve(
     with _listen(port) as listening:
         bound = listening.getsockname()[1]
         live = Live(
-            text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
+            text, path.name if own else f"{path.stem}.toml", folder, out,
             [source for source in trusted if source.named], starts, token, bound, batch,
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
@@ -130,11 +131,6 @@ def _is_spec(path: Path) -> bool:
     except UnitcadError:
         return False
     return bool(compound_kind(data)) or {"name", "layers"} <= set(data)
-
-
-def is_own(source: str | None) -> bool:
-    """Tell whether a source is a file of the person's own, not a template's name."""
-    return source is not None and is_path(source) and source not in custom_templates()
 
 
 def _listen(port: int) -> socket.socket:

@@ -104,23 +104,15 @@ def _unit(spec: Spec, answer: Answer) -> None:
     across = widths(spec, [solids[body.name].bounding_box() for body in moulds.unit if body.made != "bought"])
     names = ("diameter",) if not is_custom(spec.design) else ("width",) if len(across) == 1 else ("length", "width")
     answer.figures = [(name, size, "mm") for name, size in zip((*names, "height"), (*across, height), strict=True)]
-    grams = _grams(
-        spec, [solids[f"layer{i + 1}"].volume() for i in range(len(spec.layers)) if f"layer{i + 1}" in solids]
-    )
+    known, grams = catalogue.materials(spec.materials), []
+    layers = {f"layer{i}": float(known[layer.material].density_g_cm3) for i, layer in enumerate(spec.layers, 1)}
+    if layers.keys() <= solids.keys():
+        grams = [density * solids[name].volume() / 1000 for name, density in layers.items()]
     if grams:
         answer.figures.append(("silicone", sum(grams), "g"))
     if grams and not spec.motor.absent:
         motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
         answer.figures.append(("with its motor", sum(grams) + 1e3 * motor_mass(spec, motor).middle, "g"))
-
-
-def _grams(spec: Spec, volumes: list[float]) -> list[float]:
-
-    known = catalogue.materials(spec.materials)
-    if len(volumes) != len(spec.layers):
-        return []
-    pairs = zip(spec.layers, volumes, strict=True)
-    return [float(known[layer.material].density_g_cm3) * volume / 1000 for layer, volume in pairs]
 
 
 def _moulds(spec: Spec, answer: Answer) -> None:
