@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -296,10 +296,13 @@ def tabulate(
         probability=probability(target, predictive),
         novelty=new,
         mass_g=1e3 * mass,
-        cure_hours=_bench_hours(made)[geometry] + cures[sequence],
+        cure_hours=_by_key(made, lambda of: (of.design, of.motor, len(of.walls)), _bench_hours)[geometry]
+        + cures[sequence],
         height_mm=np.array([one.height_mm for one in made])[geometry],
         diameter_mm=np.array([one.lengths.diameter for one in made])[geometry],
-        crosstalk=_crosstalk(target, made)[geometry],
+        crosstalk=_by_key(made, lambda of: (of.motor, of.diameter), lambda one: _crosstalk(one, target.goals.pitch_mm))[
+            geometry
+        ],
     )
 
 
@@ -350,37 +353,32 @@ def _cure_hours(names: Iterable[str], entries: Mapping[str, catalogue.Material],
     return sum(at_room(float(entries[name].cure_h), room_c) for name in names)
 
 
-def _bench_hours(made: Sequence[Geometry]) -> np.ndarray:
-    """Return the hours of each geometry's procedure without its cures, NaN if its moulds can't be made.
+def _by_key(
+    made: Sequence[Geometry], key: Callable[[Lengths], Hashable], value: Callable[[Geometry], float]
+) -> np.ndarray:
+    """Return a value of each geometry, worked out once for all geometries of one key."""
+    first = {key(one.lengths): one for one in reversed(made)}
+    known = {own: value(one) for own, one in first.items()}
+    return np.array([known[key(one.lengths)] for one in made])
+
+
+def _bench_hours(one: Geometry) -> float:
+    """Return the hours of a geometry's procedure without its cures, NaN if its moulds can't be made.
 
     Lengths do not change them.
     """
-    known: dict[tuple[str, str, int], float] = {}
-    hours = np.full(len(made), np.nan)
-    for i, one in enumerate(made):
-        key = one.lengths.design, one.lengths.motor, len(one.lengths.walls)
-        if key not in known:
-            spec, names = one.spec, (layer.material for layer in one.spec.layers)
-            cures = _cure_hours(names, catalogue.materials(spec.materials), spec.casting.room_c)
-            try:
-                known[key] = finish_hours(spec) - cures
-            except Refusal:
-                known[key] = math.nan
-        hours[i] = known[key]
-    return hours
+    spec, names = one.spec, (layer.material for layer in one.spec.layers)
+    try:
+        return finish_hours(spec) - _cure_hours(names, catalogue.materials(spec.materials), spec.casting.room_c)
+    except Refusal:
+        return math.nan
 
 
-def _crosstalk(target: Target, made: Sequence[Geometry]) -> np.ndarray:
-    """Return the ratio of each geometry at the pitch, or at touching units, without its range; NaN without a pitch."""
-    pitch, known = target.goals.pitch_mm, dict[tuple[str, float], float]()
-    ratios = np.full(len(made), np.nan)
-    for i, one in enumerate(made if pitch is not None else ()):
-        key = one.lengths.motor, one.lengths.diameter
-        if key not in known:
-            distance = max(pitch or 0.0, one.lengths.diameter)
-            known[key] = crosstalk_ratio(one.variant, 1e-3 * distance, spread=False).middle
-        ratios[i] = known[key]
-    return ratios
+def _crosstalk(one: Geometry, pitch: float | None) -> float:
+    """Return the ratio of a geometry at the pitch, or at touching units, without its range; NaN without a pitch."""
+    if pitch is None:
+        return math.nan
+    return crosstalk_ratio(one.variant, 1e-3 * max(pitch, one.lengths.diameter), spread=False).middle
 
 
 @dataclass(frozen=True)

@@ -45,49 +45,33 @@ def watching(json_lines: bool) -> Iterator[Watch]:
         yield _line
     elif say:
         yield lambda summary, outcome: say(f"{summary.done} of {summary.variants} variants")
-    elif sys.stderr.isatty():
-        with _bar() as watch:
-            yield watch
-    else:
+    elif not sys.stderr.isatty():
         yield lambda summary, outcome: None
+    else:
+        columns = (
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]:.1f}/s  reused {task.fields[reused]}  failed {task.fields[failed]}"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=console(stderr=True)) as bar:
+            shown = bar.add_task("", total=None, rate=0.0, reused=0, failed=0)
+
+            def watch(summary: Summary, outcome: JournalEntry | None) -> None:
+                speed, total, failed = bar.tasks[0].speed or 0.0, summary.variants, summary.failed
+                bar.update(shown, total=total, completed=summary.done, rate=speed, reused=summary.reused, failed=failed)
+
+            yield watch
 
 
 def _line(summary: Summary, outcome: JournalEntry | None) -> None:
     if outcome is None:
         event = {"event": "end", **{k: v for k, v in to_builtins(summary).items() if k != "failures"}}
     else:
-        event = {
-            "event": "variant",
-            "index": outcome.index,
-            "status": outcome.status,
-            "folder": outcome.folder,
-            "reason": outcome.reason,
-            "seconds": round(outcome.seconds, 4),
-            "done": summary.done,
-            "variants": summary.variants,
-        }
+        own = {key: getattr(outcome, key) for key in ("index", "status", "folder", "reason")}
+        counts = {"seconds": round(outcome.seconds, 4), "done": summary.done, "variants": summary.variants}
+        event = {"event": "variant", **own, **counts}
     print_json_line(event)
-
-
-@contextlib.contextmanager
-def _bar() -> Iterator[Watch]:
-
-    columns = (
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]:.1f}/s  reused {task.fields[reused]}  failed {task.fields[failed]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console(stderr=True)) as progress:
-        shown = progress.add_task("", total=None, rate=0.0, reused=0, failed=0)
-
-        def watch(summary: Summary, outcome: JournalEntry | None) -> None:
-            speed, total, failed = progress.tasks[0].speed or 0.0, summary.variants, summary.failed
-            progress.update(
-                shown, total=total, completed=summary.done, rate=speed, reused=summary.reused, failed=failed
-            )
-
-        yield watch
 
 
 PAGE_UP_TO = 100

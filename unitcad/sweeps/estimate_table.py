@@ -37,7 +37,7 @@ def write_estimates(
                 journal.add(entry)
             count_entry(summary, entry.status, lambda entry=entry: entry)
             watch(summary, JournalEntry(index, entry.status, entry.reason))
-        finish(sweep, journal, head, options, summary, start, 1)
+        finish(sweep, journal, head, summary, start, 1)
     watch(summary, None)
     return summary
 

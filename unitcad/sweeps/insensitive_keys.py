@@ -6,7 +6,6 @@ the level changes with it.
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ import numpy as np
 from unitcad.attenuation.edge.estimates import leave_one_out_errors
 from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import edge_levels, stored
-from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
@@ -127,27 +125,19 @@ def _spec(sweep: Sweep, index: int) -> Spec | None:
 
 def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:
     """Return levels by model while only the value at a path goes through those of the sweep, from variant `index`."""
-    base, values = sweep.values(index)
-    data, levels = sweep.base_data(base), {model: list[float]() for model in models}
-    for own, value in values.items():
-        put(data, own, value)
+    levels = {model: list[float]() for model in models}
     for value in _values(sweep, path):
-        variant = _change(data, path, value)
-        for model in models if variant else ():
-            assert variant is not None
+        data = sweep.data(index)
+        try:
+            put(data, path, value)
+            variant = estimate_input(from_data(data, Path()))
+        except UnitcadError:
+            continue
+        for model in models:
             level = float(edge_levels(nominal(variant), model, stored(variant.moduli)[model])[0])
             if np.isfinite(level) and level > 0:
                 levels[model].append(level)
     return levels
-
-
-def _change(data: dict[str, Any], path: str, value: Any) -> EstimateInput | None:
-    changed = copy.deepcopy(data)
-    try:
-        put(changed, path, value)
-        return estimate_input(from_data(changed, Path()))
-    except UnitcadError:
-        return None
 
 
 def _values(sweep: Sweep, path: str) -> Iterator[Any]:

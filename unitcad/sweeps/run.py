@@ -96,7 +96,7 @@ def run(
         clear_leftovers(out)
         batch.all()
         clear_leftovers(out)  # of workers that ended in the middle of their task
-        finish(sweep, journal, head, options, summary, start, workers)
+        finish(sweep, journal, head, summary, start, workers)
         watch(summary, None)
     except OSError as error:
         reason = tasks.failure(0, error).reason
@@ -113,12 +113,9 @@ def run(
     return summary
 
 
-def finish(
-    sweep: Sweep, journal: Journal, head: BatchHead, options: BatchOptions, summary: Summary, start: float, workers: int
-) -> None:
+def finish(sweep: Sweep, journal: Journal, head: BatchHead, summary: Summary, start: float, workers: int) -> None:
     """Write the tables of a batch that is whole in its journal, and its times since `start`. Raises OSError."""
-    count = summary.variants
-    found = swept_estimate(sweep, count) if "estimate" in head.outputs else None
+    found = swept_estimate(sweep, summary.variants) if "estimate" in head.outputs else None
     summary.warnings += insensitive_warnings(found)
     write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found)
     summary.seconds = round(time.perf_counter() - start, 3)

@@ -59,7 +59,10 @@ def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
         elif entry is not None:
             there = node if isinstance(node, list) else []
             if index_in(step, len(there)) is None:
-                limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {_entries(len(there))}"
+                has = (
+                    f"they are 0 to {len(there) - 1}" if there[1:] else "its only one is 0" if there else "it is empty"
+                )
+                limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {has}"
                 raise UnknownKey(f"{place}.{path}", None, limit)
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
@@ -95,13 +98,6 @@ def label(values: Mapping[str, Any]) -> str:
         elif isinstance(value, list) and all(isinstance(each, int | float) for each in value):
             parts.append(f"{key}{'x'.join(f'{each:g}' for each in value)}")
     return "-".join(parts)[:_LABEL].rstrip("-.")
-
-
-def _entries(count: int) -> str:
-    """Say how the entries of a list are numbered."""
-    if count < 2:
-        return "its only one is 0" if count else "it is empty"
-    return f"they are 0 to {count - 1}"
 
 
 def known_paths(base: dict[str, Any]) -> list[str]:
@@ -275,21 +271,21 @@ class Sweep:
 
     def spec(self, index: int) -> Any:
         """Return the resolved spec, or the array, of variant `index`. Raises Refusal."""
-        return subject_of_data(self._data(index)).of
+        return subject_of_data(self.data(index)).of
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return the faults of a refused variant in one line; `first` is its refusal."""
-        kind = compound_kind(self._data(index))
+        kind = compound_kind(self.data(index))
         if isinstance(first, Refusal) and kind:
             if index < EXPLAINED:
-                return str(load(kind.subject).offered(first, self._data(index)))
+                return str(load(kind.subject).offered(first, self.data(index)))
             return str(Refusal(first.field, first.value, first.limit))  # without an offer, which nobody tried
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
         base, values = self.values(index)
         file = self.written.get(base)
         text = read_text(file) if file else ""
-        every = all_faults(first, self._data(index), text)
+        every = all_faults(first, self.data(index), text)
         for fault in every:
             if file and fault.field not in (*values, *self.fixed):
                 fault.file = str(file)
@@ -300,19 +296,16 @@ class Sweep:
         """Whether any base is built of several units, such as an array."""
         return any(map(compound_kind, self.bases.values()))
 
-    def _data(self, index: int) -> dict[str, Any]:
+    def data(self, index: int) -> dict[str, Any]:
+        """Return the plain data of variant `index`. Raises Refusal for a path that leads nowhere."""
         base, values = self.values(index)
-        data = self.base_data(base)
+        data = json.loads(self._texts[base])
         for path, value in values.items():
             put(data, path, value)
         swept = {path: value for path, value in values.items() if path not in self._alone}
         if "name" not in values and isinstance(data.get("name"), str) and (named := label(swept)):
             data["name"] = f"{data['name'][: 49 - len(named)]}-{named}"
         return data
-
-    def base_data(self, base: str) -> dict[str, Any]:
-        """Return a copy of a base's data."""
-        return json.loads(self._texts[base])
 
     @cached_property
     def _alone(self) -> set[str]:
