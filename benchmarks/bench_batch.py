@@ -29,8 +29,8 @@ import psutil
 from unitcad.cache import usage
 from unitcad.sweeps import BatchOptions, estimate_table, run
 from unitcad.sweeps.executors import SerialExecutor
+from unitcad.sweeps.journal import JournalEntry
 from unitcad.sweeps.sweep import Sweep, from_file
-from unitcad.sweeps.task import VariantOutcome
 
 SILICONES = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
 GEOMETRIES = 20
@@ -185,7 +185,7 @@ class Nothing(Executor):
             "laws_held": 44,
         }
         future.set_result(
-            [VariantOutcome(job.index, "ok", f"encapsulating-{job.index:012x}", row) for job in args[0].jobs]
+            [JournalEntry(job.index, "ok", folder=f"encapsulating-{job.index:012x}", row=row) for job in args[0].jobs]
         )
         return future
 

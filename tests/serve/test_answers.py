@@ -112,6 +112,6 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path):
     folder = tmp_path / "out" / "sweep-2"
     assert sorted(path.name for path in folder.iterdir()) == ["results", "spec.toml", "sweep.toml"]
     swept = from_file(tomllib.loads((folder / "sweep.toml").read_text()), folder, "sweep")
-    assert [(axis.path, axis.values) for axis in swept.axes] == [("layers.0.wall_mm", [2.0, 3.0])]
+    assert swept.axes == {"layers.0.wall_mm": [2.0, 3.0]}
     # Defaults follow the key's values: the base is the text itself.
     assert (folder / "spec.toml").read_text() == quick

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 from running import apart
 
-from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import Jobs, build_folder
+from unitcad.serve.request_guard import AccessKeys
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the command is a script of the shell")

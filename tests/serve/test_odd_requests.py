@@ -8,7 +8,7 @@ import pytest
 from running import serving
 
 from tests.in_process import unitcad
-from unitcad.serve.access_keys import AccessKeys
+from unitcad.serve.request_guard import AccessKeys
 from unitcad.validation import templates
 
 TEXT = templates()["embedded"].read_text("utf-8")

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from unitcad.serve.access_keys import AccessKeys
-from unitcad.serve.request_guard import LARGEST_BODY
+from unitcad.serve.request_guard import LARGEST_BODY, AccessKeys
 from unitcad.validation import templates
 
 HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]"]

@@ -18,7 +18,7 @@ from process_trees import until
 from unitcad.errors import UnitcadError
 from unitcad.spec import custom_code
 from unitcad.sweeps import BatchOptions, load_sweep, run
-from unitcad.sweeps.executors import SerialExecutor, Workers, dask_executor
+from unitcad.sweeps.executors import SerialExecutor, dask_executor, open_executor
 from unitcad.sweeps.sweep import from_file
 
 dask = pytest.importorskip("dask")
@@ -216,7 +216,7 @@ def test_certificates_that_can_not_be_used(text, message, tmp_path):
         file.write_text(text)
         named = {"ca-file": str(file), "client.cert": str(file), "client.key": str(file)}
     with dask.config.set({f"distributed.comm.tls.{key}": value for key, value in named.items()}):
-        opened = Workers(None, "tls://127.0.0.1:9").executor()
+        opened = open_executor(None, "tls://127.0.0.1:9")
         with pytest.raises(UnitcadError, match=message), opened:
             pass
 

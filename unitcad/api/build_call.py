@@ -141,16 +141,12 @@ def build(
     >>> built.ok, round(built.volumes["layer1"])
     (True, 181)
     """
-    into, say, outputs = Path(path("out", out)), progress or _silent, texts("only", only)
+    into, outputs = Path(path("out", out)), texts("only", only)
     wanted = load_subject(source, set, outputs)
     if formats is not None:
         wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
-    built = build_whole(wanted.of, into, only=outputs, check=check, say=say)
+    built = build_whole(wanted.of, into, only=outputs, check=check, say=progress or (lambda step: None))
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         with hold_folder(built.folder):
             write_report(built.folder)
     return BuildResult(built.folder, built.manifest, built.sha256, wanted.unit)
-
-
-def _silent(step: str) -> None:
-    """Say nothing."""

@@ -63,7 +63,7 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     """Return plain data with the whole spec of each unit in it. Raises Refusal for a file that may not be named."""
     named = named_files(data)
     values = set(named.values())
-    folders = [Path(source.folder) for source in trusted.sources if values <= set(source.named.values())]
+    folders = [Path(source.folder) for source in trusted if values <= set(source.named.values())]
     if named and not folders:
         field, value = next(iter(named.items()))
         raise Refusal(field, value, "a page's text names only files that the server's own array names")

@@ -54,33 +54,25 @@ def main() -> NoReturn:
             _leave_interrupted()
         sys.exit(code)
     except UnitcadError as error:
-        say_error(error, form)
-        sys.exit(error.exit_code)
+        failed, code = error, error.exit_code
     except KeyboardInterrupt:
         _leave_interrupted()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except (NotADirectoryError, FileExistsError) as error:
-        say_error(in_the_way(Path(error.filename or "")), form)
-        sys.exit(2)
+        failed, code = in_the_way(Path(error.filename or "")), 2
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        say_error(UnitcadError(f"{place}{error.strerror or error}"), form)
-        sys.exit(2)
+        failed, code = UnitcadError(f"{place}{error.strerror or error}"), 2
     except MemoryError:
-        say_error(UnitcadError("out of memory"), form)
-        sys.exit(1)
+        failed, code = UnitcadError("out of memory"), 1
     except Exception as error:
         if _interrupt_behind(error):
             _leave_interrupted()
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise
-        if _lacks_memory(error):
-            say_error(UnitcadError(f"out of memory: {error}"), form)
-            sys.exit(1)
-        say_error(
-            UnitcadError(f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"),
-            form,
-        )
-        sys.exit(1)
+        text = f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"
+        failed, code = UnitcadError(f"out of memory: {error}" if _lacks_memory(error) else text), 1
+    say_error(failed, form)
+    sys.exit(code)

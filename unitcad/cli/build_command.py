@@ -37,7 +37,6 @@ from unitcad.designs import widths
 from unitcad.errors import UnitcadError, WrongArgument, install_command
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline import step_helper
-from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
 from unitcad.pipeline.subjects import Compound, load_subject
 from unitcad.pipeline.write import BENCH, PAGE, Built, hold_folder
@@ -113,7 +112,9 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
         silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
         cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
-        yield f"{each}{_across(spec, manifest['parts'])} mm across, {high} mm high{circuit}{silicone}"
+        cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
+        across = " x ".join(number(width, 3) for width in widths(spec, cast))
+        yield f"{each}{across} mm across, {high} mm high{circuit}{silicone}"
     yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
@@ -150,12 +151,6 @@ def to_open(folder: Path) -> Iterator[str]:
 def _height(parts: list[PartRecord]) -> str:
     boxes = [part["bbox_mm"] for part in parts]
     return number(max((box[5] for box in boxes), default=0.0) - min((box[2] for box in boxes), default=0.0), 3)
-
-
-def _across(spec: Spec, parts: list[PartRecord]) -> str:
-    """Return a unit's width without motor, circuit and wires, as text: "14", or "30 x 20"."""
-    boxes = [part["bbox_mm"] for part in parts if part["role"] == "unit" and part["made"] != "bought"]
-    return " x ".join(number(width, 3) for width in widths(spec, boxes))
 
 
 def build(
@@ -208,7 +203,11 @@ def build(
             for (spec, given), result in zip(wanted, results, strict=True):
                 _print_faults(result.manifest)
                 # Standard output has the folder alone, for a script to take.
-                for line in _summary(spec, result, given):
+                if isinstance(spec, Compound):
+                    lines = spec.summary(result.folder, result.manifest, given)
+                else:
+                    lines = summary(spec.unit, result, given)
+                for line in lines:
                     warn(f"{spec.name}: {line}")
                 typer.echo(str(result.folder))
         return all(result.ok for result in results)
@@ -235,13 +234,6 @@ def _given_paths(source: str, changes: list[str]) -> frozenset[str]:
     shipped = source in every_template() or (Path(source).parent / "manifest.json").exists()
     own = {} if shipped else read_toml(Path(source))
     return frozenset({change.partition("=")[0].strip() for change in changes} | {path for path, _ in numbers(own)})
-
-
-def _summary(of: Subject, built: Built, given: frozenset[str]) -> Iterator[str]:
-    """Return the lines of a result; `given`: see `_given_paths`."""
-    if isinstance(of, Compound):
-        return of.summary(built.folder, built.manifest, given)
-    return summary(of.unit, built, given)
 
 
 def _print_faults(manifest: Manifest) -> None:

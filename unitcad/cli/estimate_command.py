@@ -122,10 +122,11 @@ def _models(data: dict[str, Any]) -> Rows:
             **{f"% of an all-{control} unit's": ratios.get(control, "-") for control in controls},
         }
 
-    rows = [
-        row(name, level(block["edge_level"], 100), _predicted(block.get("predictive")), block)
-        for name, block in blocks.items()
-    ]
+    rows = []
+    for name, block in blocks.items():
+        ends: dict[str, Any] = block.get("predictive") or {}
+        spread = "-" if ends.get("p10") is None else f"{100 * ends['p10']:.3g} to {100 * ends['p90']:.3g}"
+        rows.append(row(name, level(block["edge_level"], 100), spread, block))
     rows.append(row("baseline", f"{100 * answer['class_mean']:.3g} ({answer['class']})"))
     for own in data.get("own_measured", ()):
         rows.append(row("measured here", level(own, 100), f"{own['unit']}, {own['frequency_hz']:g} Hz"))
@@ -177,20 +178,13 @@ def _mean(error: dict[str, Any], ends: dict[str, Any]) -> str:
     return f"x {error['geometric_mean']:.2f} ({ends['low']:.2f} to {ends['high']:.2f})"
 
 
-def _predicted(block: dict[str, Any] | None) -> str:
-    return "-" if block is None or block["p10"] is None else f"{100 * block['p10']:.3g} to {100 * block['p90']:.3g}"
-
-
-def _fit_name(fit: dict[str, Any]) -> str:
-    return f"fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})"
-
-
 def _fit_line(fit: dict[str, Any]) -> str:
     """Return the line that names the fit and its scores."""
     scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["leave_one_out"].items())
     paper = " and the paper's nine" if fit["include_paper_units"] else ""
     units = f"{fit['own_units']} units of the lab{paper}"
-    return f"{_fit_name(fit)}, {fit['leads']} leads: {units}; leave-one-out error: {scores}"
+    name = f"fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})"
+    return f"{name}, {fit['leads']} leads: {units}; leave-one-out error: {scores}"
 
 
 def _print_slopes(data: dict[str, Any]) -> None:
@@ -249,24 +243,17 @@ def _curve(layered: dict[str, Any]) -> Rows:
 
 
 def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
-    """Format a value with its range, or the one of the two that there is."""
+    """Format a value with its range, or the one of the two that there is; a level next to nothing as below 0.01 %."""
     if not quantity:
         return "-"
+    scaled = [None if quantity.get(key) is None else factor * quantity[key] for key in ("value", "low", "high")]
     value, low, high = (
-        None if quantity.get(k) is None else _format_number(quantity[k] * factor, factor, digits) for k in _PARTS
+        one if one is None else "below 0.01" if factor == 100 and one < 0.01 else f"{one:.{digits}g}" for one in scaled
     )
     spread = f"{low} to {high}" if low and high and low != high else ""
     if value:
         return f"{value} ({spread})" if spread else value
     return spread or "not known"
-
-
-def _format_number(value: float, factor: float, digits: int) -> str:
-    """Format a number; a level next to nothing as below 0.01 %."""
-    return "below 0.01" if factor == 100 and value < 0.01 else f"{value:.{digits}g}"
-
-
-_PARTS = ("value", "low", "high")
 
 
 def estimate(

@@ -21,7 +21,9 @@ from unitcad.workers import STAGES
 
 def print_json(data: Any) -> None:
     """Write `data` as the one JSON object on standard output. Raises ValueError for NaN and infinity."""
-    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, ensure_ascii=not _unicode(sys.stdout)) + "\n")
+    encoding = (getattr(sys.stdout, "encoding", None) or "").lower().replace("-", "")
+    ascii_only = encoding not in ("utf8", "utf16", "utf32")
+    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, ensure_ascii=ascii_only) + "\n")
 
 
 def print_json_line(data: Any) -> None:
@@ -46,10 +48,6 @@ def speak_anywhere() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _unicode(stream: Any) -> bool:
-    return (getattr(stream, "encoding", None) or "").lower().replace("-", "") in ("utf8", "utf16", "utf32")
 
 
 def say_error(error: UnitcadError, form: Form) -> None:

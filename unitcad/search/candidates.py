@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -29,7 +29,7 @@ from unitcad.estimate_inputs import drawn_input, silicone_layer
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.target_file import MOST_GEOMETRIES, Target
 from unitcad.spec import Spec
-from unitcad.text import join_words, number, some
+from unitcad.text import join_words, some
 from unitcad.validation import from_data
 
 MOST_CANDIDATES = 400_000
@@ -296,10 +296,13 @@ def tabulate(
         probability=probability(target, predictive),
         novelty=new,
         mass_g=1e3 * mass,
-        cure_hours=_bench_hours(made)[geometry] + cures[sequence],
+        cure_hours=_by_key(made, lambda of: (of.design, of.motor, len(of.walls)), _bench_hours)[geometry]
+        + cures[sequence],
         height_mm=np.array([one.height_mm for one in made])[geometry],
         diameter_mm=np.array([one.lengths.diameter for one in made])[geometry],
-        crosstalk=_crosstalk(target, made)[geometry],
+        crosstalk=_by_key(made, lambda of: (of.motor, of.diameter), lambda one: _crosstalk(one, target.goals.pitch_mm))[
+            geometry
+        ],
     )
 
 
@@ -350,49 +353,42 @@ def _cure_hours(names: Iterable[str], entries: Mapping[str, catalogue.Material],
     return sum(at_room(float(entries[name].cure_h), room_c) for name in names)
 
 
-def _bench_hours(made: Sequence[Geometry]) -> np.ndarray:
-    """Return the hours of each geometry's procedure without its cures, NaN if its moulds can't be made.
+def _by_key(
+    made: Sequence[Geometry], key: Callable[[Lengths], Hashable], value: Callable[[Geometry], float]
+) -> np.ndarray:
+    """Return a value of each geometry, worked out once for all geometries of one key."""
+    first = {key(one.lengths): one for one in reversed(made)}
+    known = {own: value(one) for own, one in first.items()}
+    return np.array([known[key(one.lengths)] for one in made])
+
+
+def _bench_hours(one: Geometry) -> float:
+    """Return the hours of a geometry's procedure without its cures, NaN if its moulds can't be made.
 
     Lengths do not change them.
     """
-    known: dict[tuple[str, str, int], float] = {}
-    hours = np.full(len(made), np.nan)
-    for i, one in enumerate(made):
-        key = one.lengths.design, one.lengths.motor, len(one.lengths.walls)
-        if key not in known:
-            spec, names = one.spec, (layer.material for layer in one.spec.layers)
-            cures = _cure_hours(names, catalogue.materials(spec.materials), spec.casting.room_c)
-            try:
-                known[key] = finish_hours(spec) - cures
-            except Refusal:
-                known[key] = math.nan
-        hours[i] = known[key]
-    return hours
+    spec, names = one.spec, (layer.material for layer in one.spec.layers)
+    try:
+        return finish_hours(spec) - _cure_hours(names, catalogue.materials(spec.materials), spec.casting.room_c)
+    except Refusal:
+        return math.nan
 
 
-def _crosstalk(target: Target, made: Sequence[Geometry]) -> np.ndarray:
-    """Return the ratio of each geometry at the pitch, or at touching units, without its range; NaN without a pitch."""
-    pitch, known = target.goals.pitch_mm, dict[tuple[str, float], float]()
-    ratios = np.full(len(made), np.nan)
-    for i, one in enumerate(made if pitch is not None else ()):
-        key = one.lengths.motor, one.lengths.diameter
-        if key not in known:
-            distance = max(pitch or 0.0, one.lengths.diameter)
-            known[key] = crosstalk_ratio(one.variant, 1e-3 * distance, spread=False).middle
-        ratios[i] = known[key]
-    return ratios
+def _crosstalk(one: Geometry, pitch: float | None) -> float:
+    """Return the ratio of a geometry at the pitch, or at touching units, without its range; NaN without a pitch."""
+    if pitch is None:
+        return math.nan
+    return crosstalk_ratio(one.variant, 1e-3 * max(pitch, one.lengths.diameter), spread=False).middle
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit: the target's key and value, the limited quantity, the unit, each row's value, and who meets it.
+    """A limit: the target's key and value, each row's value, and who meets it.
 
     is_least: `asked` is the least value that is allowed, otherwise the largest.
     """
 
     key: str
-    what: str
-    unit: str
     asked: float
     values: np.ndarray
     met: np.ndarray
@@ -405,12 +401,6 @@ class Limit:
             far = np.abs(np.log(self.values / self.asked))
         return np.where(self.met, 0.0, np.where(np.isnan(far), np.inf, far))
 
-    def shown(self, row: int) -> str:
-        """Return a row's value and the limit in words."""
-        if np.isnan(self.values[row]):
-            return f"{self.what}: none, since moulds can't be made (at most {number(self.asked, 3)}{self.unit})"
-        return f"{self.what} {number(self.values[row], 3)} of at most {number(self.asked, 3)}{self.unit}"
-
     def offer(self, row: int) -> float:
         """Return the value to ask for in its place: three digits, and the row meets it."""
         sign, value = -1.0 if self.is_least else 1.0, float(self.values[row])
@@ -422,19 +412,18 @@ class Limit:
 
 def limits(found: Candidates) -> list[Limit]:
     """Return the limits that a target sets besides the level."""
-    goals = found.target.goals
     columns = {
-        "diameter_max_mm": ("diameter", " mm", found.diameter_mm),
-        "height_max_mm": ("height", " mm", found.height_mm),
-        "mass_max_g": ("mass", " g", found.mass_g),
-        "cure_hours_max": ("cure", " h", found.cure_hours),
-        "crosstalk_ratio_max": ("crosstalk ratio", "", found.crosstalk),
-        "pitch_mm": ("diameter, so that neighbours do not touch,", " mm", found.diameter_mm),
+        "diameter_max_mm": found.diameter_mm,
+        "height_max_mm": found.height_mm,
+        "mass_max_g": found.mass_g,
+        "cure_hours_max": found.cure_hours,
+        "crosstalk_ratio_max": found.crosstalk,
+        "pitch_mm": found.diameter_mm,  # neighbours do not touch
     }
     return [
-        Limit(key, what, unit, most, values, values <= most * (1 + 1e-9))
-        for key, (what, unit, values) in columns.items()
-        if (most := getattr(goals, key)) is not None
+        Limit(key, most, values, values <= most * (1 + 1e-9))
+        for key, values in columns.items()
+        if (most := getattr(found.target.goals, key)) is not None
     ]
 
 
@@ -461,7 +450,7 @@ def _level_limit(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) -
     values = found.predictive.quantile(1 - share if is_least else share)
     values[list(measured)] = [one["level"] for one in measured.values()]
     key, asked = ("edge_min", goals.edge_min) if is_least else ("edge_max", goals.edge_max)
-    return Limit(key, "level at the edge", "", asked or 0.0, values, meets_level(found, measured), is_least)
+    return Limit(key, asked or 0.0, values, meets_level(found, measured), is_least)
 
 
 def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) -> None:
@@ -476,12 +465,13 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
     rows = np.arange(found.count)  # of equally near ones, the one with the fewest unmeasured inputs
     row = int(np.lexsort((rows, found.novelty, np.round(far.sum(axis=0), 9)))[0])
     none = f"none of {found.count} candidates meets it" + (" and the rest" if len(asked) > 1 else "")
+    left_out = f"; not tried, without a modulus: {some(found.skipped)}" if found.skipped else ""
     offers = {limit.key: (limit.asked, limit.offer(row)) for i, limit in enumerate(asked) if missed[i, row]}
     made = []
     for key, (value, offer) in offers.items():
         others = [f"target.{other} = {instead:g}" for other, (_, instead) in offers.items() if other != key]
         together = f": together with {join_words(others)}" if others else ""
-        words = f"{none}; nearest is {label(found, row)}{together}{_left_out(found)}"
+        words = f"{none}; nearest is {label(found, row)}{together}{left_out}"
         made.append(Refusal(f"target.{key}", value, words, offer))
     made[0].others = tuple(made[1:])
     raise made[0]
@@ -493,7 +483,3 @@ def label(found: Candidates, row: int) -> str:
     walls = " and ".join(f"{wall:g}" for wall in lengths.walls)
     motor = f", {lengths.motor}" if len(found.target.asked.at_hand.motors) > 1 else ""
     return f"{lengths.design} {'/'.join(found.materials(row))}, walls {walls} mm{motor}"
-
-
-def _left_out(found: Candidates) -> str:
-    return f"; not tried, without a modulus: {some(found.skipped)}" if found.skipped else ""

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.output import console, print_indented, print_json, progress
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.files import path_seen_from
 from unitcad.search import design_files
@@ -42,15 +42,12 @@ def design(
     if as_json:
         print_json({"folder": str(folder), **data})
         return
-    plain, bold = partial(console().print, soft_wrap=True), partial(console().print, soft_wrap=True, style="bold")
+    bold = partial(console().print, soft_wrap=True, style="bold")
     bold(f"{data['name']}: {design_files.target_line(data['target'])}")
-    for line in design_files.head_lines(data):
-        plain(f"  {line}")
+    print_indented(*design_files.head_lines(data))
     for one in data["proposals"]:
         bold(design_files.title(one))
-        plain(f"   {design_files.level_line(one)}")
-        for line in design_files.lines(one):
-            plain(f"   - {line}")
+        print_indented(f" {design_files.level_line(one)}", *(f" - {line}" for line in design_files.lines(one)))
     for line in design_files.skipped_lines(data):
-        plain(line)
+        console().print(line, soft_wrap=True)
     typer.echo(str(folder))

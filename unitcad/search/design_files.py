@@ -77,20 +77,16 @@ def title(one: Mapping[str, Any]) -> str:
 
 
 def level_line(one: Mapping[str, Any]) -> str:
-    """Return a proposal's measurement, if there is one, then its probability and range."""
-    first = f"{measured_words(one['measured'])}; " if one["measured"] else ""
-    edge = one["edge"]
+    """Return a proposal's measurement and by whom, if there is one, then its probability and range."""
+    first, edge = "", one["edge"]
+    if measured := one["measured"]:
+        level, second = percent(measured["level"]), measured.get("also")
+        also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
+        first = f"measured {level} ({measured['by']}{also}): meets the target; "
     return (
         f"{first}probability {one['probability']:.2f}, {percent(edge['p10'])} to {percent(edge['p90'])} "
         "at the edge (10 to 90 %)"
     )
-
-
-def measured_words(measured: Mapping[str, Any]) -> str:
-    """Return a unit's measurement and by whom."""
-    level, second = percent(measured["level"]), measured.get("also")
-    also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
-    return f"measured {level} ({measured['by']}{also}): meets the target"
 
 
 def lines(one: Mapping[str, Any]) -> list[str]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
-from unitcad.attenuation.curve import RANGE as CROSSTALK_RANGE
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.measured import measured_block, nearest
@@ -26,7 +26,6 @@ from unitcad.search.candidates import (
     candidates,
     check_possible,
     label,
-    limits,
     meets_level,
     within,
 )
@@ -167,7 +166,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         one["equal_to"] = None if first is one else first["rank"]
     data = {
         "name": target.name,
-        "target": {key: value for key, value in _goals(target).items() if value is not None},
+        "target": {key: value for key, value in structs.asdict(target.goals).items() if value is not None},
         "tried": {
             "candidates": found.count,
             "geometries": int(np.unique(found.geometry).size),
@@ -225,7 +224,7 @@ def castability(spec: Spec) -> tuple[int, list[str]]:
 
 
 def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None) -> dict[str, Any]:
-    """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
+    """Return a candidate as data: its kind, its probability and range, its measurement, unmeasured inputs."""
     variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
     low, middle, high = (float(end[row]) for end in found.range)
     measured = measurement(found.target, variant)
@@ -245,7 +244,6 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "height_mm": float(found.height_mm[row]),
         "mass_g": float(found.mass_g[row]),
         "cure_hours": float(found.cure_hours[row]),
-        "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,
         "lengths_measured": not found.novelty[row],
         "relies_on": nearest(variant)["differs_in"],
@@ -259,8 +257,6 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
             "low": ratio.low,
             "high": ratio.high,
             "pitch_mm": goals.pitch_mm,
-            "drive": variant.drive,
-            "range": CROSSTALK_RANGE,
             "neighbour": (ratio.value or ratio.middle) * middle,
         }
         if goals.crosstalk_ratio_max is not None and (ratio.high or 0.0) > goals.crosstalk_ratio_max:
@@ -283,10 +279,6 @@ def name_of(found: Candidates, row: int) -> str:
     if len(found.target.asked.at_hand.motors) > 1:
         parts.append(lengths.motor.lower())
     return re.sub(r"[^a-z0-9.]+", "-", "-".join(parts).lower()).strip("-")[:110]
-
-
-def _goals(target: Target) -> dict[str, Any]:
-    return {key: getattr(target.goals, key) for key in target.goals.__struct_fields__}
 
 
 def _gain(kind: Kind) -> str:

@@ -29,7 +29,7 @@ from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert
-from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
+from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, Moduli
 from unitcad.validation.defaults import lab_fit
 from unitcad.validation.load import load_file
 
@@ -169,11 +169,6 @@ class Target:
     def goals(self) -> TargetTable:
         """The table `target`."""
         return self.asked.target
-
-    @property
-    def casting(self) -> CastingTable:
-        """The lab as a spec has it."""
-        return convert(self.entries["casting"], CastingTable, "spec.casting")
 
 
 def load_target(source: str | os.PathLike[str]) -> Target:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hashlib
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -20,12 +19,11 @@ from starlette.routing import Route
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
-from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
-from unitcad.serve.request_guard import RequestGuard
+from unitcad.serve.request_guard import AccessKeys, RequestGuard
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
@@ -40,12 +38,30 @@ _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 
 """A result's page runs apart: it can reach neither the token nor this server."""
 
 
-@dataclass(frozen=True)
-class Setting:
-    """State of a server: the first text and its file's name, the folders of files, the files that texts may name.
+def application(live: Live) -> RequestGuard:
+    """Return the ASGI application of a live page."""
+    routes = [
+        Route("/", live.page),
+        Route("/files/{path:path}", live.file),
+        Route("/job/{job}", live.job),
+        Route("/variant/{folder}", live.variant),
+        _post("/ask", Ask, live.questions.ask),
+        _post("/save", Save, live.save),
+        _post("/build", Build, live.build),
+        _post("/sweep", Sweep, live.sweep),
+        _post("/cancel", Cancel, live.cancel),
+    ]
+    inner = Starlette(routes=routes, lifespan=live.lifespan)
+    return RequestGuard(inner, live.token, live.port, live.cookie, live.keys)
 
-    `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that
-    the page lists.
+
+@dataclass(eq=False)
+class Live:
+    """The handlers of the routes, with a worker for each kind of question and the jobs.
+
+    `text` is the first text, `name` its file's, `trusted` the files that texts may name, `starts` the texts to start
+    from. `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that the
+    page lists.
     """
 
     text: str
@@ -58,34 +74,11 @@ class Setting:
     port: int
     batch: Path | None = None
 
-
-def application(live: Live) -> RequestGuard:
-    """Return the ASGI application of a live page."""
-    setting = live.setting
-    routes = [
-        Route("/", live.page),
-        Route("/files/{path:path}", live.file),
-        Route("/job/{job}", live.job),
-        Route("/variant/{folder}", live.variant),
-        Route("/ask", live.ask, methods=["POST"]),
-        Route("/save", live.save, methods=["POST"]),
-        Route("/build", live.build, methods=["POST"]),
-        Route("/sweep", live.sweep, methods=["POST"]),
-        Route("/cancel", live.cancel, methods=["POST"]),
-    ]
-    inner = Starlette(routes=routes, lifespan=live.lifespan)
-    return RequestGuard(inner, setting.token, setting.port, live.cookie, live.keys)
-
-
-class Live:
-    """The handlers of the routes, with a worker for each kind of question and the jobs."""
-
-    def __init__(self, setting: Setting) -> None:
-        self.setting = setting
-        self.cookie = f"unitcad-{setting.port}"
-        self.keys = AccessKeys(setting.token)
-        self.questions = Questions(setting.text, setting.trusted)
-        self.jobs = Jobs(setting.out, self.keys)
+    def __post_init__(self) -> None:
+        self.cookie = f"unitcad-{self.port}"
+        self.keys = AccessKeys(self.token)
+        self.questions = Questions(self.text, self.trusted)
+        self.jobs = Jobs(self.out, self.keys)
         self._saving = asyncio.Lock()
 
     @contextlib.asynccontextmanager
@@ -104,60 +97,43 @@ class Live:
 
     async def page(self, request: Request) -> Response:
         """Answer with the page, with the cookie that loads it again."""
-        setting = self.setting
         batch = None
-        if setting.batch:
+        if self.batch:
             try:
-                batch = (await asyncio.to_thread(page_data, setting.batch, modelled=None))[0]
+                batch = (await asyncio.to_thread(page_data, self.batch, modelled=None))[0]
             except (UnitcadError, OSError, RuntimeError) as error:  # RuntimeError: a loop of links
                 return PlainTextResponse(f"{error}\n", 422)
-        html = live_page(setting.text, setting.name, str(setting.folder), setting.starts, batch)
+        html = live_page(self.text, self.name, str(self.folder), self.starts, batch)
         headers = {"content-security-policy": HEADER_POLICY}
         response = Response(html, media_type="text/html; charset=utf-8", headers=headers)
         response.set_cookie(self.cookie, self.keys.cookie, httponly=True, samesite="strict")
         return response
 
-    async def ask(self, request: Request) -> Response:
-        """Answer a question about a text by the worker for it."""
-        return await _handled(request, Ask, self.questions.ask)
-
-    async def save(self, request: Request) -> Response:
+    async def save(self, save: Save) -> bytes:
         """Write the text as a file in the server's folder."""
-        return await _handled(request, Save, self._save)
-
-    async def _save(self, save: Save) -> bytes:
-        path = self.setting.folder / save.name
-        content = save.text.encode("utf-8")
+        path = self.folder / save.name
         if names_device(save.name):
             raise Refusal("name", save.name, "is the name of a device on Windows", f"my-{save.name}")
         async with self._saving:
-            await asyncio.to_thread(_write, path, content, save.replace)
+            await asyncio.to_thread(_write, path, save.text.encode("utf-8"), save.replace)
         # Work in progress is saved too, and the page says that it is refused.
         refused = None
         try:
             await self._resolved(save.text)
         except UnitcadError as error:
             refused = str(error)
-        return msgspec.json.encode(
-            {"path": str(path), "sha256": hashlib.sha256(content).hexdigest(), "refused": refused}
-        )
+        return msgspec.json.encode({"path": str(path), "refused": refused})
 
-    async def build(self, request: Request) -> Response:
+    async def build(self, build: Build) -> bytes:
         """Start the full build of the text."""
-        return await _handled(request, Build, self._build)
-
-    async def _build(self, build: Build) -> bytes:
         given, code = await self._resolved(build.text)
-        out = self.setting.out
-        arguments = ["build", "{spec}", "-o", _plain(out), *code]
-        state = self.jobs.start("the build", arguments, {"spec.toml": given["text"]}, build_folder(out))
+        # Braces of an argument are placeholders of files.
+        arguments = ["build", "{spec}", "-o", str(self.out).replace("{", "{{").replace("}", "}}"), *code]
+        state = self.jobs.start("the build", arguments, {"spec.toml": given["text"]}, build_folder(self.out))
         return msgspec.json.encode(state)
 
-    async def sweep(self, request: Request) -> Response:
+    async def sweep(self, sweep: Sweep) -> bytes:
         """Start the batch of a key's values."""
-        return await _handled(request, Sweep, self._sweep)
-
-    async def _sweep(self, sweep: Sweep) -> bytes:
         if not sweep.low < sweep.high:
             raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
         given, code = await self._resolved(sweep.text)
@@ -170,7 +146,7 @@ class Live:
         arguments = ["batch", "{sweep}", "-o", f"{{folder}}/{RESULTS}", "--report", *code]
         # The base has only the keys of the text: defaults follow the key's values as they do on the page.
         files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
-        state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.setting.out), first)
+        state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.out), first)
         return msgspec.json.encode(state)
 
     async def _resolved(self, text: str) -> tuple[dict[str, Any], list[str]]:
@@ -190,7 +166,7 @@ class Live:
 
     async def variant(self, request: Request) -> Response:
         """Answer with the spec of a variant of the batch, as text."""
-        root, folder = self.setting.batch, request.path_params["folder"]
+        root, folder = self.batch, request.path_params["folder"]
         path = _within(root, f"{folder}/spec.toml") if root else None
         if path is None:
             return PlainTextResponse("no such variant\n", 404)
@@ -208,18 +184,14 @@ class Live:
         except (msgspec.ValidationError, UnitcadError):
             return PlainTextResponse("no such job\n", 404)
 
-    async def cancel(self, request: Request) -> Response:
+    async def cancel(self, cancel: Cancel) -> bytes:
         """End a job."""
-
-        async def cancelled(cancel: Cancel) -> bytes:
-            return msgspec.json.encode(await self.jobs.cancel(cancel.job))
-
-        return await _handled(request, Cancel, cancelled)
+        return msgspec.json.encode(await self.jobs.cancel(cancel.job))
 
     async def file(self, request: Request) -> Response:
         """Answer with a file of a result, which runs apart from this server; its path begins with a folder's key."""
         asked = self.keys.file(request.path_params["path"])
-        path = _within(self.setting.out, asked) if asked else None
+        path = _within(self.out, asked) if asked else None
         try:
             file = open(path, "rb", opener=regular(links=False)) if path else None  # noqa: SIM115  # by _pieces
         except (UnitcadError, OSError):  # it has gone meanwhile, or may not be read
@@ -230,25 +202,30 @@ class Live:
         return StreamingResponse(_pieces(file), media_type=FILE_TYPES[path.suffix], headers=headers)
 
 
-async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Response:
-    """Parse a message, handle it, and answer with JSON: with the one fault if there is one."""
-    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        return PlainTextResponse("messages are application/json\n", 415)
-    try:
-        message = msgspec.json.decode(await request.body(), type=kind)
-    except (msgspec.DecodeError, RecursionError) as error:
-        return PlainTextResponse(f"not a message that this page sends: {error}\n", 400)
-    try:
-        return _json(await handle(message))
-    except Superseded:
-        # No fault: a browser would tell of one in its console.
-        return _json(msgspec.json.encode({"superseded": True}))
-    except (WorkerEnded, NoWorker) as error:
-        return _json(msgspec.json.encode({"faults": [Fault(str(error))], "again": True}), 500)
-    except Refusal as error:
-        return _json(msgspec.json.encode({"faults": [Fault(str(error), error.field, error.as_dict()["nearest"])]}), 422)
-    except (UnitcadError, OSError) as error:
-        return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
+def _post(path: str, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Route:
+    """Return the route of a kind of message: the answer is that of `handle`, or the one fault."""
+
+    async def endpoint(request: Request) -> Response:
+        if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+            return PlainTextResponse("messages are application/json\n", 415)
+        try:
+            message = msgspec.json.decode(await request.body(), type=kind)
+        except (msgspec.DecodeError, RecursionError) as error:
+            return PlainTextResponse(f"not a message that this page sends: {error}\n", 400)
+        try:
+            return _json(await handle(message))
+        except Superseded:
+            # No fault: a browser would tell of one in its console.
+            return _json(msgspec.json.encode({"superseded": True}))
+        except (WorkerEnded, NoWorker) as error:
+            return _json(msgspec.json.encode({"faults": [Fault(str(error))], "again": True}), 500)
+        except Refusal as error:
+            fault = Fault(str(error), error.field, error.as_dict()["nearest"])
+            return _json(msgspec.json.encode({"faults": [fault]}), 422)
+        except (UnitcadError, OSError) as error:
+            return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
+
+    return Route(path, endpoint, methods=["POST"])
 
 
 def _write(path: Path, content: bytes, replace: bool) -> None:
@@ -270,11 +247,6 @@ def _pieces(file: IO[bytes]) -> Iterator[bytes]:
 
 def _json(content: bytes, status: int = 200) -> Response:
     return Response(content, status, media_type="application/json")
-
-
-def _plain(path: Path) -> str:
-    """Return a path for an argument in which braces are placeholders of files."""
-    return str(path).replace("{", "{{").replace("}", "}}")
 
 
 def _within(root: Path, asked: str) -> Path | None:

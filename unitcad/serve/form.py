@@ -74,7 +74,11 @@ _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
     """Return the form of a spec's plain data; `spec` is the resolved one, None if the data is refused."""
-    settled = to_data(spec) if spec else _part(data)
+    settled = to_data(spec) if spec else {}
+    named = at(data, "motor.part")
+    if not spec and isinstance(named, str) and (entry := motors().get(named)):  # which a refused spec has not settled
+        sizes = {size: float(getattr(entry, size)) for size in MOTOR_SIZES}
+        settled["motor"] = sizes | ({"drive": entry.drive.value} if entry.drive else {})
     choices = choices_of(data)
     made = [Group("", "Unit", [*fields(RawSpec, "", data, settled, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
@@ -83,14 +87,6 @@ def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
             Group(f"layers.{i}", f"Layer {i + 1}", [*fields(LayerTable, f"layers.{i}", data, settled, choices)])
         )
     return [*made, *table_groups((*_TABLES, *LAST_TABLES), data, settled, choices)]
-
-
-def _part(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the sizes of the named motor, which a refused spec has not settled."""
-    named = at(data, "motor.part")
-    entry = motors().get(named) if isinstance(named, str) else None
-    sizes = {size: float(getattr(entry, size)) for size in MOTOR_SIZES if entry}
-    return {"motor": sizes | ({"drive": entry.drive.value} if entry and entry.drive else {})}
 
 
 def table_groups(
@@ -206,7 +202,7 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
     def names(name: str) -> list[tuple[str, str]]:
         return [(each, "of this spec") for each in own.get(name, {})]
 
-    found: dict[str, list[tuple[str, str]]] = {
+    return {
         "design": [(name, design.about) for name, design in shipped().items()],
         "layers.material": [*((name, _modulus(entry)) for name, entry in materials().items()), *names("materials")],
         "motor.part": [*((name, f"{number(entry.diameter_mm, 3)} mm across") for name, entry in motors().items()),
@@ -215,7 +211,6 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
                            *names("printers")],
         "estimate.tissue": [*((name, "") for name in ("forearm",) if tissue(name)), *names("tissue")],
     }  # fmt: skip
-    return found
 
 
 def _modulus(entry: Material) -> str:
@@ -245,41 +240,38 @@ def _apply(document: Any, edit: Edit) -> None:
     *way, last = edit.path.split(".")
     node = document
     for step in way:
-        if isinstance(node, list):
+        if not isinstance(node, dict):
             node = node[_index(node, step, edit)]
-        elif isinstance(node, dict):
-            if step == "unit" and isinstance(node.get(step), str):
-                # A unit that an array names is the `like` of the table that changes it.
-                named = tomlkit.inline_table()
-                named["like"] = str(node[step])
-                named.comment(node[step].trivia.comment)
-                node[step] = named
-            if step not in node:
-                if edit.remove:
-                    return
-                node[step] = tomlkit.inline_table() if isinstance(node, InlineTable) else tomlkit.table()
-            node = node[step]
-        else:
-            raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")
-    if isinstance(node, list):
-        if edit.remove:
-            del node[_index(node, last, edit)]
-        elif isinstance(node, AoT) and not isinstance(edit.value, dict):
-            raise Refusal(edit.path, edit.value, "the entries of this list are tables")
-        elif last == str(len(node)):
-            node.append(_item(_value(edit)))
-        else:
-            node[_index(node, last, edit)] = _value(edit)
-    elif isinstance(node, dict):
+            continue
+        if step == "unit" and isinstance(node.get(step), str):
+            # A unit that an array names is the `like` of the table that changes it.
+            named = tomlkit.inline_table()
+            named["like"] = str(node[step])
+            named.comment(node[step].trivia.comment)
+            node[step] = named
+        if step not in node:
+            if edit.remove:
+                return
+            node[step] = tomlkit.inline_table() if isinstance(node, InlineTable) else tomlkit.table()
+        node = node[step]
+    if isinstance(node, dict):
         if edit.remove:
             node.pop(last, None)
         else:
             node[last] = _item(_value(edit))
+    elif edit.remove:
+        del node[_index(node, last, edit)]
+    elif isinstance(node, AoT) and not isinstance(edit.value, dict):
+        raise Refusal(edit.path, edit.value, "the entries of this list are tables")
+    elif isinstance(node, list) and last == str(len(node)):
+        node.append(_item(_value(edit)))
     else:
+        node[_index(node, last, edit)] = _value(edit)
+
+
+def _index(node: Any, step: str, edit: Edit) -> int:
+    if not isinstance(node, list):
         raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")
-
-
-def _index(node: Sequence[Any], step: str, edit: Edit) -> int:
     index = index_in(step, len(node))
     if index is None:
         raise no_entry(edit.path, edit.value, step, len(node))

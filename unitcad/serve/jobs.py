@@ -14,8 +14,8 @@ from pathlib import Path
 
 from unitcad.errors import UnitcadError
 from unitcad.files import scratch
-from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.messages import JobState
+from unitcad.serve.request_guard import AccessKeys
 from unitcad.workers import STAGES, Call, Pool, run_here
 
 MOST_KEPT = 20
@@ -142,7 +142,12 @@ def build_folder(out: Path) -> Iterator[Path]:
 def sweep_folder(out: Path) -> Iterator[Path]:
     """Make the first of sweep-1, sweep-2, ... that is not there; it goes with the block unless `results` are in it."""
     with _temporary_folder(out):
-        folder = next(path for i in count(1) if _is_new(path := out / f"sweep-{i}"))
+        number = count(1)
+        while True:
+            folder = out / f"sweep-{next(number)}"
+            with suppress(FileExistsError):
+                folder.mkdir()
+                break
         try:
             yield folder
         finally:
@@ -161,11 +166,3 @@ def _temporary_folder(out: Path) -> Iterator[None]:
         if not before:
             with suppress(OSError):  # it is not empty
                 out.rmdir()
-
-
-def _is_new(folder: Path) -> bool:
-    """Make a folder; tell whether it was not there."""
-    with suppress(FileExistsError):
-        folder.mkdir()
-        return True
-    return False

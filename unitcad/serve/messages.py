@@ -143,7 +143,7 @@ class Group(Struct, frozen=True, omit_defaults=True):
 class Answer(Struct, kw_only=True, omit_defaults=True):
     """An answer: the text after its edits, the faults, and the results if there is none.
 
-    `milliseconds` is the time that it took, `processor_ms` that of the processor.
+    `processor_ms` is the time of the processor.
     `groups` are the form's; `spec` the resolved spec; `figures` are (name, value, unit), `drawings` (caption, SVG).
     """
 
@@ -160,7 +160,6 @@ class Answer(Struct, kw_only=True, omit_defaults=True):
     drawings: list[tuple[str, str]] = []
     estimate: dict[str, Any] | None = None
     layers: int = 0
-    milliseconds: float = 0.0
     processor_ms: float = 0.0
 
 
@@ -187,7 +186,5 @@ class Source(Struct, frozen=True):
     named: dict[str, str]
 
 
-class Trusted(Struct, frozen=True):
-    """Files that the page's texts may name: all those of one of these specs, and no other."""
-
-    sources: list[Source] = []
+Trusted = list[Source]
+"""Files that the page's texts may name: all those of one of these specs, and no other."""

@@ -40,7 +40,7 @@ class Questions:
         self._text = text
         self._pools: dict[What, Pool] = {}
         self.turns = {what: asyncio.Lock() for what in ANSWER_S}
-        self._newest: dict[tuple[str, What], asyncio.Event] = {}
+        self._newest: dict[tuple[str, What], asyncio.Future[None]] = {}
 
     def pool(self, what: What) -> Pool:
         """Return the worker of a kind, which first answers the question of the text at the start: this warms it up."""
@@ -53,13 +53,12 @@ class Questions:
         """Return the answer to a question. Raises Superseded if a newer one of its page came, WorkerEnded, NoWorker."""
         overtaken = self._overtake(ask)
         async with self.turns[ask.what]:
-            if overtaken.is_set():
+            if overtaken.done():
                 raise Superseded
             answer = asyncio.create_task(self.call(ask.what, *self._parts(ask), seconds=ANSWER_S[ask.what]))
             try:
                 await asyncio.wait([answer], timeout=GRACE_S)
-                if not answer.done():
-                    await _either(answer, overtaken)
+                await asyncio.wait([answer, overtaken], return_when=asyncio.FIRST_COMPLETED)
                 if not answer.done():
                     raise Superseded
                 return await answer
@@ -94,25 +93,16 @@ class Questions:
         """End the workers; a question under way is answered that its worker was stopped."""
         await asyncio.gather(*(asyncio.to_thread(pool.shutdown) for pool in self._pools.values()))
 
-    def _overtake(self, ask: Ask) -> asyncio.Event:
-        """Notify the older question of the same page; return the event that a newer one will set."""
+    def _overtake(self, ask: Ask) -> asyncio.Future[None]:
+        """Notify the older question of the same page; return the future that a newer one will end."""
         key = ask.page, ask.what
         older = self._newest.pop(key, None)
         if older:
-            older.set()
-        self._newest[key] = overtaken = asyncio.Event()
+            older.set_result(None)
+        self._newest[key] = overtaken = asyncio.get_running_loop().create_future()
         while len(self._newest) > _MOST_PAGES:
             del self._newest[next(iter(self._newest))]
         return overtaken
 
     def _parts(self, ask: Ask) -> tuple[str, bytes, bytes]:
         return "unitcad.serve.answers:respond", msgspec.json.encode(ask), self.trusted
-
-
-async def _either(answer: asyncio.Task[bytes], event: asyncio.Event) -> None:
-    """Wait until an answer is there or an event is set."""
-    waiting = asyncio.create_task(event.wait())
-    try:
-        await asyncio.wait([answer, waiting], return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        waiting.cancel()

@@ -12,9 +12,8 @@ from tomlkit.exceptions import TOMLKitError
 
 from unitcad.errors import NEAREST, Refusal, UnitcadError, format_value
 from unitcad.serve.messages import Edit, Fault
-from unitcad.validation import put
 from unitcad.validation.plain_data import ABSENT, at, drop
-from unitcad.validation.suggestions import find_refusal, follow, is_number, nearest_number
+from unitcad.validation.suggestions import Changes, find_refusal, follow, is_number, nearest_number, with_changes
 
 Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 """Validates plain data and returns it settled; raises UnitcadError for a fault."""
@@ -28,17 +27,19 @@ def add_remedies(
     `since` reverts the changes since the data was accepted, newest first. If one of these changes caused a fault of
     another field, the fault is `at` the changed one. `whole` also refuses units without possible tools.
     """
-    changed = {edit.path for edit in since}
-    blamed = None
-    if any(fault.field not in changed for fault in faults):
-        blamed = next((edit for edit in since if _is_accepted(_after(data, edit), judge)), None)
     own = {edit.path: edit for edit in since}
+    blamed = None
+    if any(fault.field not in own for fault in faults):
+        blamed = next((edit for edit in since if not find_refusal(data, _changes(edit), judge)), None)
     alone = len(faults) == 1
     told = [
         _with_remedy(one, data, None if one.field in own else blamed, own.get(one.field), alone, judge, whole)
         for one in faults
     ]
-    return _mark_removable(told, data, judge)
+    fields, without = [fault.field for fault in faults], copy.deepcopy(dict(data))
+    if len(fields) < 2 or not all([drop(without, field) for field in fields]) or find_refusal(without, {}, judge):
+        return told
+    return [replace(one, leave_out=True, together=[field for field in fields if field != one.field]) for one in told]
 
 
 def _with_remedy(
@@ -52,7 +53,8 @@ def _with_remedy(
 ) -> Fault:
     """Return a fault with its remedy; `own` takes back the change of its field, `blamed` that of another one."""
     if fault.rename is not None:
-        if _is_accepted(_rename(data, fault.field, fault.rename[0]), judge):
+        renamed = {fault.field: None, fault.rename[0]: at(data, fault.field)}
+        if at(data, fault.rename[0]) is ABSENT and not find_refusal(data, renamed, judge):
             return fault
         fault = replace(fault, rename=None)
     if fault.nearest is not None:
@@ -65,10 +67,8 @@ def _with_remedy(
         back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else None
         back = _nearest(data, blamed, judge, whole) if back is None else back
         return replace(fault, at=blamed.path, at_nearest=back)
-    if fault.nearest is None and at(data, fault.field) is not ABSENT:
-        without = copy.deepcopy(dict(data))
-        if drop(without, fault.field) and _is_accepted(without, judge):
-            return replace(fault, leave_out=True)
+    if fault.nearest is None and not find_refusal(data, {fault.field: None}, judge):
+        return replace(fault, leave_out=True)
     return fault
 
 
@@ -77,15 +77,16 @@ def _with_ring(data: Mapping[str, Any], blamed: Edit | None, least: float, judge
     if blamed is None:
         return least
     try:
-        before = _ring(judge(_after(data, blamed)))
-        kept = round(least + 2 * (before - _ring(judge(_after(data, Edit(path="diameter_mm", value=least))))), 3)
+        before, now = (_ring(data, changes, judge) for changes in (_changes(blamed), {"diameter_mm": least}))
     except (UnitcadError, KeyError, TypeError):
         return least
-    return kept if kept > least and _is_accepted(_after(data, Edit(path="diameter_mm", value=kept)), whole) else least
+    kept = round(least + 2 * (before - now), 3)
+    return kept if kept > least and not find_refusal(data, {"diameter_mm": kept}, whole) else least
 
 
-def _ring(settled: Mapping[str, Any]) -> float:
-    """Return the width of the ring of air of a settled spec."""
+def _ring(data: Mapping[str, Any], changes: Changes, judge: Judge) -> float:
+    """Return the width of the ring of air after changes. Raises UnitcadError, KeyError or TypeError without one."""
+    settled = judge(with_changes(data, changes))
     walls = sum(layer["wall_mm"] for layer in settled["layers"])
     return settled["diameter_mm"] / 2 - settled["motor"]["diameter_mm"] / 2 - walls
 
@@ -102,38 +103,14 @@ def _with_offer(fault: Fault, nearest: Any) -> Fault:
 
 def _offer(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool, judge: Judge, whole: Judge) -> Any:
     """Return the value to offer for a fault, whose nearest value meets only its own limit; None for nothing."""
-    whole_too = _onwards(data, fault.field, fault.nearest, whole)
-    if whole_too is not None:
-        return whole_too
+    accepted, _ = follow(Refusal(fault.field, None, "", fault.nearest), data, whole)
+    if set(accepted) == {fault.field}:
+        return accepted[fault.field]
     if own and (nearest := _nearest(data, own, judge, whole)) is not None:
         return nearest
     # If no change makes all of it acceptable, or the former data is unknown, it cures its own fault.
-    cures = not alone or not own or _is_accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
+    cures = not alone or not own or not find_refusal(data, {fault.field: fault.nearest}, judge)
     return fault.nearest if cures else None
-
-
-def _onwards(data: Mapping[str, Any], path: str, value: Any, judge: Judge) -> Any:
-    """Return a value that is accepted at a path: the given one, or the one that its refusals offer in its place."""
-    changes, _ = follow(Refusal(path, None, "", value), data, judge)
-    return changes[path] if set(changes) == {path} else None
-
-
-def _rename(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
-    """Return plain data whose key at a path has the name at another path."""
-    changed = copy.deepcopy(dict(data))
-    value = at(changed, path)
-    if at(changed, right) is ABSENT and drop(changed, path):
-        put(changed, right, value)
-    return changed
-
-
-def _mark_removable(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) -> list[Fault]:
-    """Return the faults, marked to remove their keys together if the text is accepted without all of them."""
-    fields = [fault.field for fault in faults]
-    without = copy.deepcopy(dict(data))
-    if len(fields) < 2 or not all([drop(without, field) for field in fields]) or not _is_accepted(without, judge):
-        return list(faults)
-    return [replace(one, leave_out=True, together=[field for field in fields if field != one.field]) for one in faults]
 
 
 def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge, whole: Judge) -> float | None:
@@ -141,7 +118,7 @@ def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge, whole: Judge) ->
     bad, good = at(data, edit.path), edit.value
     if edit.remove:
         try:
-            good = at(judge(_after(data, edit)), edit.path)
+            good = at(judge(with_changes(data, {edit.path: None})), edit.path)
         except UnitcadError:
             return None
     if not is_number(bad) or not is_number(good):
@@ -152,18 +129,11 @@ def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge, whole: Judge) ->
     return None
 
 
-def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
-    """Return plain data after an edit; unchanged if its path leads nowhere."""
-    changed = copy.deepcopy(dict(data))
+def _changes(edit: Edit) -> Changes:
+    """Return an edit as a change of data; none for a text that is no TOML value."""
+    if edit.remove or not edit.toml:
+        return {edit.path: None if edit.remove else edit.value}
     try:
-        if edit.remove:
-            drop(changed, edit.path)
-        else:
-            put(changed, edit.path, tomlkit.value(str(edit.value)).unwrap() if edit.toml else edit.value)
-    except (Refusal, TOMLKitError, ValueError, RecursionError):
-        pass
-    return changed
-
-
-def _is_accepted(data: Mapping[str, Any], judge: Judge) -> bool:
-    return find_refusal(data, {}, judge) is None
+        return {edit.path: tomlkit.value(str(edit.value)).unwrap()}
+    except (TOMLKitError, ValueError, RecursionError):
+        return {}

@@ -7,13 +7,13 @@ files next to it are another site's: they carry their folder's key in their path
 
 from __future__ import annotations
 
+import hashlib
 import hmac
+from pathlib import PurePosixPath
 from urllib.parse import parse_qs
 
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-
-from unitcad.serve.access_keys import AccessKeys
 
 TOKEN_HEADER = b"x-unitcad-token"
 FILES = "/files/"
@@ -29,6 +29,32 @@ ALWAYS = (
     (b"x-content-type-options", b"nosniff"),
     (b"x-frame-options", b"DENY"),
 )
+
+
+class AccessKeys:
+    """Keys with fewer rights than the token: a cookie for the page, a key for a folder's files.
+
+    All are derived from the token, which can't be recovered from them, and end with it.
+    """
+
+    def __init__(self, token: str) -> None:
+        self._token = token.encode()
+        self.cookie = self._made("cookie")
+        """Reads only the page itself, which has no token."""
+
+    def address(self, file: str) -> str:
+        """Return the path of a file below /files/, with the key of its folder: it reads that folder and those in it."""
+        return f"{self._made(f'folder {PurePosixPath(file).parent}')}/{file}"
+
+    def file(self, address: str) -> str | None:
+        """Return the file that a path below /files/ means; None without the key of one of the folders that it is in."""
+        key, _, file = address.partition("/")
+        folders = PurePosixPath(file).parents
+        good = [hmac.compare_digest(key.encode(), self._made(f"folder {folder}").encode()) for folder in folders]
+        return file if any(good) else None
+
+    def _made(self, what: str) -> str:
+        return hmac.new(self._token, what.encode("utf-8", "replace"), hashlib.sha256).hexdigest()
 
 
 class RequestGuard:
@@ -67,8 +93,13 @@ class RequestGuard:
             return 403, "a request from another site"
         if len(scope["raw_path"]) + len(scope["query_string"]) > LONGEST_TARGET:
             return 414, f"an address has at most {LONGEST_TARGET} bytes"
-        keyed = self._has_folder_key(scope)
-        if not (keyed and _is_opened(headers)) and any(
+        path: str = scope["path"]
+        reads = scope["method"] == "GET" and path.startswith(FILES)
+        keyed = reads and self.keys.file(path.removeprefix(FILES)) is not None
+        said = {name: value for name, value in headers if name.startswith(b"sec-fetch-")}
+        # A browser opens a page or a download: no script or picture of a page asks for it.
+        opened = (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
+        if not (keyed and opened) and any(
             name == b"sec-fetch-site" and value in (b"cross-site", b"same-site") for name, value in headers
         ):
             return 403, "a request from another site"
@@ -82,12 +113,6 @@ class RequestGuard:
         if any(name == b"transfer-encoding" for name, _ in headers):
             return 411, "a body states its length"
         return None
-
-    def _has_folder_key(self, scope: Scope) -> bool:
-        path: str = scope["path"]
-        return (
-            scope["method"] == "GET" and path.startswith(FILES) and self.keys.file(path.removeprefix(FILES)) is not None
-        )
 
     def _has_token(self, scope: Scope, headers: list[tuple[bytes, bytes]]) -> bool:
         given = [value for name, value in headers if name == TOKEN_HEADER]
@@ -105,12 +130,6 @@ class RequestGuard:
         return any(
             key == self.cookie and hmac.compare_digest(text, self.keys.cookie.encode()) for key, _, text in parts
         )
-
-
-def _is_opened(headers: list[tuple[bytes, bytes]]) -> bool:
-    """Tell whether a browser opens a page or a download with a request: no script or picture of a page asks for it."""
-    said = {name: value for name, value in headers if name.startswith(b"sec-fetch-")}
-    return (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
 
 
 def _with_headers(send: Send) -> Send:

@@ -19,9 +19,9 @@ from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import expect_none_but
 from unitcad.serve.answers import answers_about
-from unitcad.serve.application import Live, Setting, application
+from unitcad.serve.application import Live, application
 from unitcad.serve.jobs import RESULTS
-from unitcad.serve.messages import Source, Trusted
+from unitcad.serve.messages import Source
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
@@ -58,7 +58,8 @@ def serve(
     path = named_file(source or default_template(), every_template(), "spec", WrongArgument)
     text = read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
-    folder = path.parent.resolve() if is_own(source) else Path.cwd()
+    own = source is not None and is_path(source) and source not in custom_templates()
+    folder = path.parent.resolve() if own else Path.cwd()
     if not compound_kind(data):
         expect_none_but("spec", data, str(path), "spec", WrongArgument)
     trusted = [_trusted_source(data, path, code)]
@@ -72,12 +73,11 @@ def serve(
             starts[name] = None
     with _listen(port) as listening:
         bound = listening.getsockname()[1]
-        setting = Setting(
-            text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
-            Trusted([source for source in trusted if source.named]), starts, token, bound, batch,
+        live = Live(
+            text, path.name if own else f"{path.stem}.toml", folder, out,
+            [source for source in trusted if source.named], starts, token, bound, batch,
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
-        live = Live(setting)
         config = uvicorn.Config(
             application(live), log_level="error", access_log=False, server_header=False, date_header=False,
             timeout_keep_alive=5, timeout_graceful_shutdown=2, limit_concurrency=MOST_REQUESTS, http="h11",
@@ -131,11 +131,6 @@ def _is_spec(path: Path) -> bool:
     except UnitcadError:
         return False
     return bool(compound_kind(data)) or {"name", "layers"} <= set(data)
-
-
-def is_own(source: str | None) -> bool:
-    """Tell whether a source is a file of the person's own, not a template's name."""
-    return source is not None and is_path(source) and source not in custom_templates()
 
 
 def _listen(port: int) -> socket.socket:

@@ -30,6 +30,7 @@ from unitcad.validation.load import all_faults
 from unitcad.validation.load import judge as judge
 
 form = groups
+named_files = files_named
 as_data = to_data
 as_toml = to_toml
 faults_of = all_faults
@@ -61,11 +62,6 @@ def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted)
     return tomlkit.dumps(with_files(data, trusted)) if files_named(data) else text
 
 
-def named_files(data: Mapping[str, Any]) -> dict[str, str]:
-    """Return the values of a spec's plain data that name files, by their fields."""
-    return files_named(data)
-
-
 def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the unit's plain data, with the field of its design."""
     yield "design", data
@@ -85,7 +81,7 @@ def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
     Raises Refusal for a design's file that no trusted spec names.
     """
     named, design = files_named(data), data.get("design")
-    folders = [Path(source.folder) for source in trusted.sources if source.named == named]
+    folders = [Path(source.folder) for source in trusted if source.named == named]
     if not folders and is_custom(design) and data.get("design_source") is None:
         limit = "a design's file is read only if the spec that the server was started with names it"
         raise Refusal("design", design, limit)
@@ -108,23 +104,15 @@ def _unit(spec: Spec, answer: Answer) -> None:
     across = widths(spec, [solids[body.name].bounding_box() for body in moulds.unit if body.made != "bought"])
     names = ("diameter",) if not is_custom(spec.design) else ("width",) if len(across) == 1 else ("length", "width")
     answer.figures = [(name, size, "mm") for name, size in zip((*names, "height"), (*across, height), strict=True)]
-    grams = _grams(
-        spec, [solids[f"layer{i + 1}"].volume() for i in range(len(spec.layers)) if f"layer{i + 1}" in solids]
-    )
+    known, grams = catalogue.materials(spec.materials), []
+    layers = {f"layer{i}": float(known[layer.material].density_g_cm3) for i, layer in enumerate(spec.layers, 1)}
+    if layers.keys() <= solids.keys():
+        grams = [density * solids[name].volume() / 1000 for name, density in layers.items()]
     if grams:
         answer.figures.append(("silicone", sum(grams), "g"))
     if grams and not spec.motor.absent:
         motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
         answer.figures.append(("with its motor", sum(grams) + 1e3 * motor_mass(spec, motor).middle, "g"))
-
-
-def _grams(spec: Spec, volumes: list[float]) -> list[float]:
-
-    known = catalogue.materials(spec.materials)
-    if len(volumes) != len(spec.layers):
-        return []
-    pairs = zip(spec.layers, volumes, strict=True)
-    return [float(known[layer.material].density_g_cm3) * volume / 1000 for layer, volume in pairs]
 
 
 def _moulds(spec: Spec, answer: Answer) -> None:

@@ -17,10 +17,10 @@ from unitcad.report import write_report
 from unitcad.report.read_results import read_batch
 from unitcad.spec.raw import OUTPUTS, Format
 from unitcad.sweeps.estimate_table import write_estimates
-from unitcad.sweeps.executors import Workers
+from unitcad.sweeps.executors import open_executor
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
-from unitcad.sweeps.journal import Preview, RefusedVariant, Summary
+from unitcad.sweeps.journal import Summary
 from unitcad.sweeps.run import BatchOptions, Watch, count_variants, run, trim
 from unitcad.sweeps.sweep import Sweep, load_sweep
 from unitcad.validation import Changes
@@ -31,8 +31,8 @@ LOOKED_AT = 20_000
 MOST_REFUSED = 20
 
 
-def preview(sweep: Sweep, options: BatchOptions) -> Preview:
-    """Count variants and distinct geometries.
+def preview(sweep: Sweep, options: BatchOptions) -> dict[str, Any]:
+    """Count variants and distinct geometries, as data; `exact`: whether every variant was looked at.
 
     Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError if all are.
     """
@@ -40,25 +40,25 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     count = count_variants(sweep, options.limit)
     looked = min(count, LOOKED_AT)
     geometries: set[str] = set()
-    refused: list[RefusedVariant] = []
+    refused: list[dict[str, Any]] = []
     for index in range(looked):
         try:
             variant = subject(sweep.spec(index))
         except UnitcadError as error:
-            refused.append(RefusedVariant(index, sweep.faults(index, error)))
+            refused.append({"index": index, "reason": sweep.faults(index, error)})
             continue
         geometries.add(variant.key(only, options.check))
     if refused and not geometries:
-        raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
+        raise UnitcadError(f"every variant is refused, the first: {refused[0]['reason']}")
     share = count / max(looked, 1)
-    return Preview(
-        variants=count,
-        geometries=round(len(geometries) * share),
-        exact=looked == count,
-        refused_count=round(len(refused) * share),
-        refused=refused[:MOST_REFUSED],
-        warnings=insensitive_warnings(swept_estimate(sweep, count)) if "estimate" in only else [],
-    )
+    return {
+        "variants": count,
+        "geometries": round(len(geometries) * share),
+        "exact": looked == count,
+        "refused_count": round(len(refused) * share),
+        "refused": refused[:MOST_REFUSED],
+        "warnings": insensitive_warnings(swept_estimate(sweep, count)) if "estimate" in only else [],
+    }
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,17 +101,21 @@ _MOST_ROWS = 20
 
 
 def make(
-    sweep: Sweep, folder: Path, options: BatchOptions, workers: Workers, watch: Watch = lambda summary, outcome: None
+    sweep: Sweep,
+    folder: Path,
+    options: BatchOptions,
+    jobs: int | None,
+    scheduler: str | None = None,
+    watch: Watch = lambda summary, outcome: None,
 ) -> Summary:
-    """Make a sweep's variants in `folder`: only estimates as one table in this process, otherwise by `workers`.
+    """Make a sweep's variants in `folder`: only estimates as one table in this process, otherwise by workers.
 
     Raises Refusal or UnitcadError if nothing can be run.
     """
     if options.only == ("estimate",) and not sweep.of_compounds:
         return write_estimates(sweep, folder, options, watch)
-    with workers.executor(options.timeout) as (executor, number):
-        remote = workers.scheduler is not None
-        summary = run(sweep, folder, options, executor, workers=number, remote=remote, watch=watch)
+    with open_executor(jobs, scheduler, options.timeout) as (executor, number):
+        summary = run(sweep, folder, options, executor, workers=number, remote=scheduler is not None, watch=watch)
     trim(options)  # once the workers have let go of it
     return summary
 
@@ -179,7 +183,7 @@ def batch(
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
     options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where)
-    summary = make(wanted, folder, options, Workers(jobs))
+    summary = make(wanted, folder, options, jobs)
     if report:
         write_report(folder)
     return BatchResult(folder, summary)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from msgspec import to_builtins
@@ -33,10 +33,8 @@ from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.batch_call import make, preview
-from unitcad.sweeps.executors import Workers
-from unitcad.sweeps.journal import Preview, Summary
+from unitcad.sweeps.journal import JournalEntry, Summary
 from unitcad.sweeps.run import BatchOptions, Watch
-from unitcad.sweeps.task import VariantOutcome
 
 
 @contextlib.contextmanager
@@ -47,54 +45,33 @@ def watching(json_lines: bool) -> Iterator[Watch]:
         yield _line
     elif say:
         yield lambda summary, outcome: say(f"{summary.done} of {summary.variants} variants")
-    elif sys.stderr.isatty():
-        with _bar() as watch:
-            yield watch
-    else:
+    elif not sys.stderr.isatty():
         yield lambda summary, outcome: None
+    else:
+        columns = (
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]:.1f}/s  reused {task.fields[reused]}  failed {task.fields[failed]}"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=console(stderr=True)) as bar:
+            shown = bar.add_task("", total=None, rate=0.0, reused=0, failed=0)
+
+            def watch(summary: Summary, outcome: JournalEntry | None) -> None:
+                speed, total, failed = bar.tasks[0].speed or 0.0, summary.variants, summary.failed
+                bar.update(shown, total=total, completed=summary.done, rate=speed, reused=summary.reused, failed=failed)
+
+            yield watch
 
 
-def _line(summary: Summary, outcome: VariantOutcome | None) -> None:
+def _line(summary: Summary, outcome: JournalEntry | None) -> None:
     if outcome is None:
         event = {"event": "end", **{k: v for k, v in to_builtins(summary).items() if k != "failures"}}
     else:
-        event = {
-            "event": "variant",
-            "index": outcome.index,
-            "status": outcome.status,
-            "folder": outcome.folder,
-            "reason": outcome.reason,
-            "seconds": round(outcome.seconds, 4),
-            "done": summary.done,
-            "variants": summary.variants,
-        }
+        own = {key: getattr(outcome, key) for key in ("index", "status", "folder", "reason")}
+        counts = {"seconds": round(outcome.seconds, 4), "done": summary.done, "variants": summary.variants}
+        event = {"event": "variant", **own, **counts}
     print_json_line(event)
-
-
-@contextlib.contextmanager
-def _bar() -> Iterator[Watch]:
-
-    columns = (
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]:.1f}/s  reused {task.fields[reused]}  failed {task.fields[failed]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console(stderr=True)) as progress:
-        shown = progress.add_task("", total=None, rate=0.0, reused=0, failed=0)
-
-        def watch(summary: Summary, outcome: VariantOutcome | None) -> None:
-            speed = progress.tasks[0].speed or 0.0
-            progress.update(
-                shown,
-                total=summary.variants,
-                completed=summary.done,
-                rate=speed,
-                reused=summary.reused,
-                failed=summary.failed,
-            )
-
-        yield watch
 
 
 PAGE_UP_TO = 100
@@ -173,34 +150,27 @@ def batch(
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
     if dry_run:
         size = preview(wanted, options)
-        print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
+        print_json(size) if as_json or json_lines else _print_preview(size)
         return
     if chosen == ("estimate",) and scheduler is not None:
         raise Refusal("--scheduler", scheduler, "estimates only are computed in this process: leave it out")
     folder = out or Path("out") / wanted.slug
-    workers = Workers(jobs, scheduler)
     try:
         with watching(json_lines) as watch:
-            summary = make(wanted, folder, options, workers, watch)
+            summary = make(wanted, folder, options, jobs, scheduler, watch)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
         sys.exit(130)
-    _write_page(folder, page)
+    if page or (folder / PAGE).is_file():  # one that is there is kept up
+        with progress(folder.name) as say:
+            say("page")
+            write_report(folder, warn)
     if as_json:
         print_json({"folder": str(folder), **to_builtins(summary)})
     elif not json_lines:
         _print_summary(summary, folder)
     if summary.failed or summary.stopped:
         sys.exit(1)
-
-
-def _write_page(folder: Path, asked: bool) -> None:
-    """Write a batch's page if it is asked for; one that is there is kept up."""
-
-    if asked or (folder / PAGE).is_file():
-        with progress(folder.name) as say:
-            say("page")
-            write_report(folder, warn)
 
 
 def _print_summary(summary: Summary, folder: Path) -> None:
@@ -219,7 +189,8 @@ def _print_summary(summary: Summary, folder: Path) -> None:
         f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
         f"{summary.failed} failed",
         *([f"{left} not tried"] if left else []),
-        _parts(summary),
+        f"{counted(summary.geometries, 'geometry', 'geometries')}, {counted(summary.reused, 'variant')} made only of "
+        "known parts",
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))
@@ -228,19 +199,13 @@ def _print_summary(summary: Summary, folder: Path) -> None:
     typer.echo(str(folder))
 
 
-def _parts(summary: Summary) -> str:
-
-    known = f"{counted(summary.reused, 'variant')} made only of known parts"
-    return f"{counted(summary.geometries, 'geometry', 'geometries')}, {known}"
-
-
-def _print_preview(size: Preview) -> None:
-
-    about = "" if size.exact else "about "
-    typer.echo(f"{counted(size.variants, 'variant')} of {about}{counted(size.geometries, 'geometry', 'geometries')}")
-    for warning in size.warnings:
+def _print_preview(size: Mapping[str, Any]) -> None:
+    about = "" if size["exact"] else "about "
+    geometries = counted(size["geometries"], "geometry", "geometries")
+    typer.echo(f"{counted(size['variants'], 'variant')} of {about}{geometries}")
+    for warning in size["warnings"]:
         warn(f"warning: {warning}")
-    for refused in size.refused:
-        warn(f"variant {refused.index} is refused: {refused.reason}")
-    if size.refused_count > len(size.refused):
-        typer.echo(f"and {about}{size.refused_count - len(size.refused)} more", err=True)
+    for refused in size["refused"]:
+        warn(f"variant {refused['index']} is refused: {refused['reason']}")
+    if (more := size["refused_count"] - len(size["refused"])) > 0:
+        typer.echo(f"and {about}{more} more", err=True)

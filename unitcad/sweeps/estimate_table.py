@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from msgspec import structs
+
 from unitcad.attenuation.edge.level import edge_level
 from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
@@ -34,8 +36,8 @@ def write_estimates(
                 entry = _entry(sweep, index)
                 journal.add(entry)
             count_entry(summary, entry.status, lambda entry=entry: entry)
-            watch(summary, tasks.VariantOutcome(index, entry.status, reason=entry.reason))
-        finish(sweep, journal, head, options, summary, start, 1)
+            watch(summary, JournalEntry(index, entry.status, entry.reason))
+        finish(sweep, journal, head, summary, start, 1)
     watch(summary, None)
     return summary
 
@@ -47,9 +49,8 @@ def _entry(sweep: Sweep, index: int) -> JournalEntry:
         spec = sweep.spec(index)
         row = {"name": spec.name, "design": spec.design, "diameter_mm": spec.diameter_mm, **levels(spec)}
     except UnitcadError as error:
-        failed = tasks.failure(index, error)
-        return JournalEntry(index=index, status=failed.status, reason=failed.reason, values=values)
-    return JournalEntry(index=index, status=tasks.OK, values=values, row=row)
+        return structs.replace(tasks.failure(index, error), values=values)
+    return JournalEntry(index, tasks.OK, values=values, row=row)
 
 
 def levels(spec: Spec) -> dict[str, float | None]:

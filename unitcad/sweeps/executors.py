@@ -9,7 +9,6 @@ import ssl
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 from unitcad.errors import UnitcadError, WrongArgument, missing_extra
@@ -98,34 +97,27 @@ class SerialExecutor(Executor):
         return future
 
 
-@dataclass(frozen=True)
-class Workers:
-    """Executor of the tasks: on the Dask cluster of `scheduler`, else in `jobs` processes.
+@contextlib.contextmanager
+def open_executor(
+    jobs: int | None, scheduler: str | None, timeout: float | None = None
+) -> Iterator[tuple[Executor, int]]:
+    """Yield an executor and its number of tasks at once; the end of the block ends its processes.
 
-    None is a process for each core, 0 this process.
+    On the Dask cluster of `scheduler`, otherwise in `jobs` processes: None is one for each core, 0 this process. Raises
+    Refusal or UnitcadError for an invalid combination, or a scheduler that does not answer.
     """
-
-    jobs: int | None = None
-    scheduler: str | None = None
-
-    @contextlib.contextmanager
-    def executor(self, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
-        """Yield an executor and its number of tasks at once; the end of the block ends its processes.
-
-        Raises Refusal or UnitcadError for an invalid combination, or a scheduler that does not answer.
-        """
-        if self.scheduler is not None:
-            if self.jobs is not None:
-                raise WrongArgument("jobs", self.jobs, "the scheduler knows its workers; leave it out with --scheduler")
-            cluster, threads = dask_executor(self.scheduler)
-            try:
-                yield cluster, threads
-            finally:
-                cluster.shutdown(wait=False)  # which cancels the tasks that the scheduler still has
-        elif self.jobs == 0:
-            if timeout is not None:
-                raise WrongArgument("timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
-            yield SerialExecutor(), 1
-        else:
-            with Pool(self.jobs or cores(), load=WARM) as pool:
-                yield pool, self.jobs or cores()
+    if scheduler is not None:
+        if jobs is not None:
+            raise WrongArgument("jobs", jobs, "the scheduler knows its workers; leave it out with --scheduler")
+        cluster, threads = dask_executor(scheduler)
+        try:
+            yield cluster, threads
+        finally:
+            cluster.shutdown(wait=False)  # which cancels the tasks that the scheduler still has
+    elif jobs == 0:
+        if timeout is not None:
+            raise WrongArgument("timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
+        yield SerialExecutor(), 1
+    else:
+        with Pool(jobs or cores(), load=WARM) as pool:
+            yield pool, jobs or cores()

@@ -6,22 +6,20 @@ the level changes with it.
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from msgspec import Struct
 
 from unitcad.attenuation.edge.estimates import leave_one_out_errors
 from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import edge_levels, stored
-from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
+from unitcad.report.read_results import SweptLevels
 from unitcad.spec import Spec
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import join_words
@@ -39,19 +37,8 @@ _STARTS, _VALUES = 4, 8
 _SAME = 1e-9
 
 
-class SweptEstimate(Struct, frozen=True):
-    """Reliability of a batch's levels: each model's typical error, a factor, the best first, and the keys not read.
-
-    `not_measured`: swept lengths in mm with values that no measured unit had, each with the one that all of them had.
-    """
-
-    typical_error: dict[str, float]
-    insensitive: dict[str, list[str]]
-    not_measured: dict[str, float]
-
-
-def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
-    """Return the models' errors and the keys that each does not read; None if no variant has an estimate.
+def swept_estimate(sweep: Sweep, count: int) -> SweptLevels | None:
+    """Return the models' errors, the best first, and the keys that each does not read; None without an estimate.
 
     Each key is changed by itself, from several variants, through several of its values, since a rule by name would have
     to know every model. A key that can't be changed by itself, or whose levels are not known, is taken for read.
@@ -74,7 +61,7 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
     fit = fit_of(starts[0][1])
     errors = leave_one_out_errors(starts[0][1].estimate.moduli, fit)
     ordered = sorted(models, key=lambda model: errors[model])
-    return SweptEstimate(
+    return SweptLevels(
         {model: float(f"{errors[model]:.6g}") for model in ordered},
         {model: unread[model] for model in ordered},
         {} if fit else _not_measured(sweep, [spec for _, spec in starts]),  # a lab's units may have other lengths
@@ -96,7 +83,7 @@ def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
     return found
 
 
-def warnings(found: SweptEstimate | None) -> list[str]:
+def warnings(found: SweptLevels | None) -> list[str]:
     """Say which models do not read which swept keys."""
     if found is None:
         return []
@@ -107,7 +94,8 @@ def warnings(found: SweptEstimate | None) -> list[str]:
     lines = []
     for paths, models in by_keys.items():
         every = len(models) == len(found.insensitive) and len(models) > 1
-        who = "no model of the edge level reads" if every else f"{join_words(models)} {_do(models)} not read"
+        does = "does" if len(models) == 1 else "do"
+        who = "no model of the edge level reads" if every else f"{join_words(models)} {does} not read"
         whose = "the" if every else "their" if len(models) > 1 else "its"
         lines.append(f"{who} {join_words(paths)}: {whose} level stays the same")
     for length in dict.fromkeys(found.not_measured.values()):
@@ -117,10 +105,6 @@ def warnings(found: SweptEstimate | None) -> list[str]:
             f"with {'it' if len(same) == 1 else 'them'}, and the error there is not known"
         )
     return lines
-
-
-def _do(models: Sequence[str]) -> str:
-    return "does" if len(models) == 1 else "do"
 
 
 def _spread(count: int, most: int) -> list[int]:
@@ -141,27 +125,19 @@ def _spec(sweep: Sweep, index: int) -> Spec | None:
 
 def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:
     """Return levels by model while only the value at a path goes through those of the sweep, from variant `index`."""
-    base, values = sweep.values(index)
-    data, levels = sweep.base_data(base), {model: list[float]() for model in models}
-    for own, value in values.items():
-        put(data, own, value)
+    levels = {model: list[float]() for model in models}
     for value in _values(sweep, path):
-        variant = _change(data, path, value)
-        for model in models if variant else ():
-            assert variant is not None
+        data = sweep.data(index)
+        try:
+            put(data, path, value)
+            variant = estimate_input(from_data(data, Path()))
+        except UnitcadError:
+            continue
+        for model in models:
             level = float(edge_levels(nominal(variant), model, stored(variant.moduli)[model])[0])
             if np.isfinite(level) and level > 0:
                 levels[model].append(level)
     return levels
-
-
-def _change(data: dict[str, Any], path: str, value: Any) -> EstimateInput | None:
-    changed = copy.deepcopy(data)
-    try:
-        put(changed, path, value)
-        return estimate_input(from_data(changed, Path()))
-    except UnitcadError:
-        return None
 
 
 def _values(sweep: Sweep, path: str) -> Iterator[Any]:
@@ -170,6 +146,6 @@ def _values(sweep: Sweep, path: str) -> Iterator[Any]:
         every: Sequence[Any] = [values[path] for _, values in sweep.cases if path in values]
         every = [value for i, value in enumerate(every) if value not in every[:i]]
     else:
-        axis = next(axis for axis in sweep.axes if axis.path == path)
-        every = [axis.values[i] for i in _spread(len(axis), _VALUES)]
+        given = sweep.axes[path]
+        every = [given[i] for i in _spread(len(given), _VALUES)]
     yield from (every[i] for i in _spread(len(every), _VALUES))

@@ -38,10 +38,11 @@ class BatchHead(Struct, frozen=True, kw_only=True):
     versions: dict[str, str] = {}
 
 
-class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class JournalEntry(Struct, frozen=True, omit_defaults=True):
     """Result of one variant; `same_as` is the index of an earlier, equal variant, whose result it shares.
 
-    `values` are those that were swept, `row` those that came out; `manifest` is the SHA-256 of its manifest.json.
+    `values` are those that were swept, `row` those that came out; `manifest` is the SHA-256 of its manifest.json. No
+    line has the last two: the time that it took, s, and whether the cache had all its parts.
     """
 
     index: int
@@ -52,6 +53,8 @@ class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     row: Values = {}
     manifest: str = ""
     same_as: int | None = None
+    seconds: float = 0.0
+    reused: bool = False
 
 
 class Failure(Struct, frozen=True):
@@ -83,24 +86,6 @@ class Summary(Struct):
     warnings: list[str] = []
 
 
-class RefusedVariant(Struct, frozen=True):
-    """A variant whose spec is refused, and why."""
-
-    index: int
-    reason: str
-
-
-class Preview(Struct, frozen=True, kw_only=True):
-    """Size of a batch that is not made; `exact`: whether its geometries are counted."""
-
-    variants: int
-    geometries: int
-    exact: bool
-    refused_count: int
-    refused: list[RefusedVariant]
-    warnings: list[str] = []
-
-
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 
 
@@ -126,7 +111,7 @@ class Journal:
     def add(self, entry: JournalEntry) -> None:
         """Write the result of one variant. Raises OSError."""
         start = self._file.seek(0, os.SEEK_END)
-        self._file.write(_pack(to_builtins(entry), self._seed))
+        self._file.write(_pack(to_builtins(structs.replace(entry, seconds=0.0, reused=False)), self._seed))
         self._file.flush()
         self._starts[entry.index] = start
 

@@ -13,8 +13,7 @@ from typing import IO, Any
 from msgspec import to_builtins
 
 from unitcad import files
-from unitcad.report.read_results import CSV, JSON
-from unitcad.sweeps.insensitive_keys import SweptEstimate
+from unitcad.report.read_results import CSV, JSON, SweptLevels
 from unitcad.sweeps.journal import BatchHead, Journal, JournalEntry, Summary, Values
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import cell
@@ -27,7 +26,7 @@ def write_results(
     columns: list[str],
     entries: Callable[[], Iterable[JournalEntry]],
     head: BatchHead,
-    estimate: SweptEstimate | None,
+    estimate: SweptLevels | None,
 ) -> None:
     """Write both tables. `entries` gives the variants in the sweep's order, one at a time. Raises OSError."""
     levels = {"estimate": to_builtins(estimate)} if estimate else {}

@@ -11,8 +11,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import structs
 
 from unitcad import __version__
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
@@ -27,7 +29,7 @@ from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary
 from unitcad.sweeps.results import columns_of, write_results, write_timings
 from unitcad.sweeps.sweep import MOST, Sweep
-from unitcad.sweeps.task import Job, Task, VariantOutcome
+from unitcad.sweeps.task import Job, Task
 from unitcad.workers import WorkerEnded
 
 WINDOW = 2048
@@ -39,7 +41,7 @@ FIRST, NEXT = 4, 48
 COLLECT_EVERY = 500
 """Geometries made between two checks of the cache's size."""
 
-Watch = Callable[[Summary, VariantOutcome | None], None]
+Watch = Callable[[Summary, JournalEntry | None], None]
 MOST_FAILURES = 20
 
 
@@ -94,10 +96,13 @@ def run(
         clear_leftovers(out)
         batch.all()
         clear_leftovers(out)  # of workers that ended in the middle of their task
-        finish(sweep, journal, head, options, summary, start, workers)
+        finish(sweep, journal, head, summary, start, workers)
         watch(summary, None)
     except OSError as error:
-        raise _ended(tasks.failure(0, error), out, summary) from error
+        reason = tasks.failure(0, error).reason
+        ended = UnitcadError(f"{out}: {reason}; {summary.done} variants are done, the same command resumes")
+        ended.exit_code = 1
+        raise ended from error
     except KeyboardInterrupt:
         for future in batch.running:
             future.cancel()
@@ -108,12 +113,9 @@ def run(
     return summary
 
 
-def finish(
-    sweep: Sweep, journal: Journal, head: BatchHead, options: BatchOptions, summary: Summary, start: float, workers: int
-) -> None:
+def finish(sweep: Sweep, journal: Journal, head: BatchHead, summary: Summary, start: float, workers: int) -> None:
     """Write the tables of a batch that is whole in its journal, and its times since `start`. Raises OSError."""
-    count = summary.variants
-    found = swept_estimate(sweep, count) if "estimate" in head.outputs else None
+    found = swept_estimate(sweep, summary.variants) if "estimate" in head.outputs else None
     summary.warnings += insensitive_warnings(found)
     write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found)
     summary.seconds = round(time.perf_counter() - start, 3)
@@ -132,7 +134,7 @@ def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> Ba
         batch=digest(repr((sweep.hash, only, options.check)).encode())[:16],
         name=sweep.name,
         mode=sweep.mode,
-        bases=[base for base, _ in sweep.bases],
+        bases=list(sweep.bases),
         outputs=list(only),
         versions={"unitcad": __version__, **kernel_versions(("step",))},
     )
@@ -149,16 +151,11 @@ def count_variants(sweep: Sweep, limit: int | None) -> int:
     return min(sweep.count, limit or sweep.count)
 
 
-@dataclass
-class _GeometryJobs:
-    """Waiting variants of one geometry."""
-
-    jobs: deque[Job] = field(default_factory=deque)
-    making: bool = False
-
-
 class _Batch:
-    """One run of one sweep; at most `room` tasks are submitted at a time."""
+    """One run of one sweep; at most `room` tasks are submitted at a time.
+
+    `groups` are the waiting variants by geometry; those of one that is in `making` wait for its first task.
+    """
 
     def __init__(
         self, sweep: Sweep, options: BatchOptions, executor: Executor, room: int,
@@ -168,13 +165,14 @@ class _Batch:
         self.watch, self.journal, self.cache, self.summary = watch, journal, cache, summary
         self.only = check_outputs(options.only)
         self.coming = self._to_make()
-        self.groups: dict[str, _GeometryJobs] = {}
+        self.groups: dict[str, deque[Job]] = {}
+        self.making: set[str] = set()
         self.waiting = 0
         self.again: deque[tuple[str, Job]] = deque()
         self.tried: set[int] = set()
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
-        self.running: dict[Future[list[VariantOutcome]], Task] = {}
+        self.running: dict[Future[list[JournalEntry]], Task] = {}
 
     def all(self) -> None:
         while not self.summary.stopped:
@@ -195,7 +193,7 @@ class _Batch:
         for index in range(self.summary.variants):
             entry = self.journal.entry(index)
             if entry is not None and self._stands(entry):
-                self._finished(VariantOutcome(index, entry.status), fresh=False)
+                self._finished(JournalEntry(index, entry.status), fresh=False)
             elif entry is not None and entry.status == tasks.FAILED:
                 failed.append(index)
             else:
@@ -224,18 +222,17 @@ class _Batch:
             try:
                 spec = self.sweep.spec(index)
             except UnitcadError as error:
-                self._finished(VariantOutcome(index, tasks.REFUSED, reason=self.sweep.faults(index, error)))
+                self._finished(JournalEntry(index, tasks.REFUSED, self.sweep.faults(index, error)))
                 continue
             wanted = subject(spec)
             first = self.seen.setdefault(int(wanted.folder_name[-12:], 16), index)
             if first != index:
-                self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
-                self._finished(VariantOutcome(index, tasks.OK), fresh=False, before=entry is not None)
+                self.journal.add(JournalEntry(index, same_as=first, values=self.sweep.values(index)[1]))
+                self._finished(JournalEntry(index, tasks.OK), fresh=False, before=entry is not None)
                 continue
             key = wanted.key(self.only, self.options.check)
-            self.groups.setdefault(key, _GeometryJobs()).jobs.append(
-                Job(index, wanted.text, entry.manifest if entry else "")
-            )
+            job = Job(index, wanted.text, entry.manifest if entry else "")
+            self.groups.setdefault(key, deque()).append(job)
             self.waiting += 1
         return self.waiting < WINDOW
 
@@ -255,14 +252,15 @@ class _Batch:
         if self.again:
             key, job = self.again.popleft()
             return key, [job]
-        ready = [key for key, group in self.groups.items() if group.jobs and not group.making]
+        ready = [key for key, jobs in self.groups.items() if jobs and key not in self.making]
         new = next((key for key in ready if _short(key) not in self.made), None)
         key = new or next(iter(ready), None)
         if key is None:
             return None
-        group = self.groups[key]
-        group.making = new is not None
-        jobs = [group.jobs.popleft() for _ in range(min(len(group.jobs), FIRST if new else NEXT))]
+        if new:
+            self.making.add(new)
+        waiting = self.groups[key]
+        jobs = [waiting.popleft() for _ in range(min(len(waiting), FIRST if new else NEXT))]
         self.waiting -= len(jobs)
         return key, jobs
 
@@ -270,7 +268,6 @@ class _Batch:
         """Collect finished tasks; wait for the first, or with `at_once` for none."""
         for future in wait(list(self.running), 0 if at_once else None, return_when="FIRST_COMPLETED").done:
             task = self.running.pop(future)
-            group = self.groups.get(task.geometry)
             try:
                 outcomes = future.result()
             except WorkerEnded as error:
@@ -281,19 +278,15 @@ class _Batch:
                 self._lost(task, error)
             else:
                 if _short(task.geometry) not in self.made and any(o.status == tasks.OK for o in outcomes):
-                    self._made(task.geometry)
+                    self.made.add(_short(task.geometry))
+                    self.summary.geometries = len(self.made)
+                    if len(self.made) % COLLECT_EVERY == 0:
+                        trim(self.options)
                 for outcome, job in zip(outcomes, task.jobs, strict=True):
                     self._outcome(outcome, task.geometry, job)
-            if group:
-                group.making = False
-                if not group.jobs:
-                    del self.groups[task.geometry]
-
-    def _made(self, key: str) -> None:
-        self.made.add(_short(key))
-        self.summary.geometries = len(self.made)
-        if len(self.made) % COLLECT_EVERY == 0:
-            trim(self.options)
+            self.making.discard(task.geometry)
+            if not self.groups.get(task.geometry, True):
+                del self.groups[task.geometry]
 
     def _lost(self, task: Task, error: BaseException) -> None:
         """Handle a task whose worker ended: each of its variants is tried by itself, to find the one that ended it."""
@@ -306,9 +299,9 @@ class _Batch:
         reason = str(error) or type(error).__name__
         if reason == "timed out" and self.options.timeout:
             reason = f"timed out after {self.options.timeout:g} s"
-        self._outcome(VariantOutcome(job.index, tasks.FAILED, reason=reason), task.geometry, job)
+        self._outcome(JournalEntry(job.index, tasks.FAILED, reason), task.geometry, job)
 
-    def _outcome(self, outcome: VariantOutcome, key: str, job: Job) -> None:
+    def _outcome(self, outcome: JournalEntry, key: str, job: Job) -> None:
         if outcome.status == tasks.NO_SPACE:
             self.summary.stopped = self.summary.stopped or outcome.reason
             return
@@ -325,23 +318,13 @@ class _Batch:
             )
         self._finished(outcome)
 
-    def _finished(self, outcome: VariantOutcome, fresh: bool = True, before: bool = True) -> None:
+    def _finished(self, outcome: JournalEntry, fresh: bool = True, before: bool = True) -> None:
         """Count a variant that has ended, and note it if it is `fresh`; others are from `before`, or another's twin."""
         summary = self.summary
         if fresh:
-            self.journal.add(
-                JournalEntry(
-                    index=outcome.index,
-                    status=outcome.status,
-                    reason=outcome.reason,
-                    folder=outcome.folder,
-                    values=self.sweep.values(outcome.index)[1],
-                    row=outcome.row,
-                    manifest=outcome.manifest,
-                )
-            )
+            self.journal.add(structs.replace(outcome, values=self.sweep.values(outcome.index)[1]))
         summary.resumed += before and not fresh
-        summary.reused += bool(fresh and outcome.reused and not outcome.built)
+        summary.reused += fresh and outcome.reused
         count_entry(summary, outcome.status, lambda: self.journal.entry(outcome.index))
         # A refusal concerns one variant only; a failure may happen to each.
         stops = outcome.status not in (tasks.OK, tasks.REFUSED) and not self.options.keep_going
@@ -364,9 +347,3 @@ def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry 
 def _short(key: str) -> int:
     """Shorten a key to 8 bytes."""
     return int(key[:16], 16)
-
-
-def _ended(outcome: VariantOutcome, out: Path, summary: Summary) -> UnitcadError:
-    error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the same command resumes")
-    error.exit_code = 1
-    return error

@@ -59,7 +59,10 @@ def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
         elif entry is not None:
             there = node if isinstance(node, list) else []
             if index_in(step, len(there)) is None:
-                limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {_entries(len(there))}"
+                has = (
+                    f"they are 0 to {len(there) - 1}" if there[1:] else "its only one is 0" if there else "it is empty"
+                )
+                limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {has}"
                 raise UnknownKey(f"{place}.{path}", None, limit)
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
@@ -95,13 +98,6 @@ def label(values: Mapping[str, Any]) -> str:
         elif isinstance(value, list) and all(isinstance(each, int | float) for each in value):
             parts.append(f"{key}{'x'.join(f'{each:g}' for each in value)}")
     return "-".join(parts)[:_LABEL].rstrip("-.")
-
-
-def _entries(count: int) -> str:
-    """Say how the entries of a list are numbered."""
-    if count < 2:
-        return "its only one is 0" if count else "it is empty"
-    return f"they are 0 to {count - 1}"
 
 
 def known_paths(base: dict[str, Any]) -> list[str]:
@@ -161,6 +157,9 @@ class Range(Struct, frozen=True, forbid_unknown_fields=True):
         return round(self.start + (self.stop - self.start) * index / (self.num - 1), 9)
 
 
+Values = Sequence[Any] | Range
+
+
 class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A sweep: which specs, over which values."""
 
@@ -198,30 +197,19 @@ class CaseKeys(Struct, frozen=True):
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One swept path and its values."""
-
-    path: str
-    values: Sequence[Any] | Range
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-
-@dataclass(frozen=True)
 class Sweep:
-    """A validated sweep: `bases` as (name, data); values by path for each case, or axes.
+    """A validated sweep: the data of each base; `cases` as (base, value by path), or `axes` as values by path.
 
     `written` are the bases that come from a file; `fixed` the paths that the sweep, or an option, sets in every base.
     """
 
     name: str
-    bases: tuple[tuple[str, dict[str, Any]], ...]
+    bases: dict[str, dict[str, Any]]
     mode: str
-    axes: tuple[Axis, ...]
-    cases: tuple[tuple[str, dict[str, Any]], ...] = ()
-    written: tuple[tuple[str, Path], ...] = ()
-    fixed: tuple[str, ...] = ()
+    axes: dict[str, Values]
+    cases: tuple[tuple[str, dict[str, Any]], ...]
+    written: Mapping[str, Path]
+    fixed: tuple[str, ...]
 
     @property
     def slug(self) -> str:
@@ -235,9 +223,9 @@ class Sweep:
         if not changes:
             return self
         for path in changes:
-            for _, data in self.bases:
+            for data in self.bases.values():
                 check_path(path, data)
-        bases = tuple((name, override(data, changes)) for name, data in self.bases)
+        bases = {name: override(data, changes) for name, data in self.bases.items()}
         return replace(self, bases=bases, fixed=(*self.fixed, *changes))
 
     @cached_property
@@ -246,8 +234,8 @@ class Sweep:
         if self.mode == "cases":
             return len(self.cases)
         per_base = 1
-        for axis in self.axes:
-            per_base = per_base * len(axis) if self.mode == "product" else max(per_base, len(axis))
+        for values in self.axes.values():
+            per_base = per_base * len(values) if self.mode == "product" else max(per_base, len(values))
         return per_base * len(self.bases)
 
     @cached_property
@@ -255,15 +243,16 @@ class Sweep:
         """Swept paths, in the file's order."""
         if self.mode == "cases":
             return tuple(dict.fromkeys(path for _, values in self.cases for path in values))
-        return tuple(axis.path for axis in self.axes)
+        return tuple(self.axes)
 
     @property
     def hash(self) -> str:
         """Hash over everything that decides which variants there are."""
         axes = [
-            (a.path, structs.asdict(a.values) if isinstance(a.values, Range) else list(a.values)) for a in self.axes
+            (path, structs.asdict(values) if isinstance(values, Range) else list(values))
+            for path, values in self.axes.items()
         ]
-        return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases]).encode())
+        return digest(json.dumps([self.name, [*self.bases.items()], self.mode, axes, self.cases]).encode())
 
     def values(self, index: int) -> tuple[str, dict[str, Any]]:
         """Return (base, value by path) of variant `index`: the last axis runs fastest, the bases slowest."""
@@ -272,30 +261,31 @@ class Sweep:
         per_base = self.count // len(self.bases)
         base, rest = divmod(index, per_base)
         chosen: dict[str, Any] = {}
-        for axis in reversed(self.axes):
+        for path, values in reversed(self.axes.items()):
             if self.mode == "product":
-                rest, here = divmod(rest, len(axis))
+                rest, here = divmod(rest, len(values))
             else:
-                here = rest if len(axis) > 1 else 0
-            chosen[axis.path] = axis.values[here]
-        return self.bases[base][0], {axis.path: chosen[axis.path] for axis in self.axes}
+                here = rest if len(values) > 1 else 0
+            chosen[path] = values[here]
+        return list(self.bases)[base], {path: chosen[path] for path in self.axes}
 
     def spec(self, index: int) -> Any:
         """Return the resolved spec, or the array, of variant `index`. Raises Refusal."""
-        return subject_of_data(self._data(index)).of
+        return subject_of_data(self.data(index)).of
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return the faults of a refused variant in one line; `first` is its refusal."""
-        kind = compound_kind(self._data(index))
+        kind = compound_kind(self.data(index))
         if isinstance(first, Refusal) and kind:
-            told = load(kind.subject).offered(first, self._data(index)) if index < EXPLAINED else _without_offer(first)
-            return str(told)
+            if index < EXPLAINED:
+                return str(load(kind.subject).offered(first, self.data(index)))
+            return str(Refusal(first.field, first.value, first.limit))  # without an offer, which nobody tried
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
         base, values = self.values(index)
-        file = dict(self.written).get(base)
+        file = self.written.get(base)
         text = read_text(file) if file else ""
-        every = all_faults(first, self._data(index), text)
+        every = all_faults(first, self.data(index), text)
         for fault in every:
             if file and fault.field not in (*values, *self.fixed):
                 fault.file = str(file)
@@ -304,11 +294,12 @@ class Sweep:
     @property
     def of_compounds(self) -> bool:
         """Whether any base is built of several units, such as an array."""
-        return any(compound_kind(data) for _, data in self.bases)
+        return any(map(compound_kind, self.bases.values()))
 
-    def _data(self, index: int) -> dict[str, Any]:
+    def data(self, index: int) -> dict[str, Any]:
+        """Return the plain data of variant `index`. Raises Refusal for a path that leads nowhere."""
         base, values = self.values(index)
-        data = self.base_data(base)
+        data = json.loads(self._texts[base])
         for path, value in values.items():
             put(data, path, value)
         swept = {path: value for path, value in values.items() if path not in self._alone}
@@ -316,26 +307,14 @@ class Sweep:
             data["name"] = f"{data['name'][: 49 - len(named)]}-{named}"
         return data
 
-    def base_data(self, base: str) -> dict[str, Any]:
-        """Return a copy of a base's data."""
-        return json.loads(self._texts[base])
-
-    def __iter__(self) -> Iterator[tuple[int, dict[str, Any]]]:
-        return ((index, self.values(index)[1]) for index in range(self.count))
-
     @cached_property
     def _alone(self) -> set[str]:
         """Paths of one value."""
-        return {axis.path for axis in self.axes if len(axis) == 1}
+        return {path for path, values in self.axes.items() if len(values) == 1}
 
     @cached_property
     def _texts(self) -> dict[str, str]:
-        return {name: json.dumps(data) for name, data in self.bases}
-
-
-def _without_offer(refusal: Refusal) -> Refusal:
-    """Return a refusal without its value to offer, which nobody tried."""
-    return Refusal(refusal.field, refusal.value, refusal.limit)
+        return {name: json.dumps(data) for name, data in self.bases.items()}
 
 
 def load_sweep(source: str | os.PathLike[str]) -> Sweep:
@@ -377,16 +356,16 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
         for path, value in file.fixed.items():
             check_path(path, bases[base], "set")
             put(bases[base], path, value)
-    axes = tuple(Axis(path, _values(path, given, table.mode)) for path, given in values.items())
+    axes = {path: _values(path, given, table.mode) for path, given in values.items()}
     cases = tuple(
         (case.base or named[0], {"name": case.name, **values} if case.name else values) for case, values in typed
     )
     _check_mode(table.mode, axes, cases)
-    for base, values in cases or [(base, {axis.path: None for axis in axes}) for base in bases]:
+    for base, values in cases or [(base, axes) for base in bases]:
         for path in values:
             check_path(path, bases[base])
-    written = tuple((base, folder / base) for base in bases if is_path(base))
-    return Sweep(file.name or name, tuple(bases.items()), table.mode, axes, cases, written, tuple(file.fixed))
+    written = {base: folder / base for base in bases if is_path(base)}
+    return Sweep(file.name or name, bases, table.mode, axes, cases, written, tuple(file.fixed))
 
 
 def _split(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:
@@ -407,7 +386,7 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
     return data
 
 
-def _values(path: str, given: Any, mode: Mode) -> Sequence[Any] | Range:
+def _values(path: str, given: Any, mode: Mode) -> Values:
     """Return the values of an axis: a scalar or a table counts as one, a table with a range's keys as a range.
 
     In a product all differ. In a zip a value may repeat, combined with another value of another axis.
@@ -429,10 +408,10 @@ def _values(path: str, given: Any, mode: Mode) -> Sequence[Any] | Range:
     return values
 
 
-def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> None:
+def _check_mode(mode: str, axes: dict[str, Values], cases: tuple[Any, ...]) -> None:
     if mode == "cases":
         if axes:
-            raise Refusal("sweep", axes[0].path, "mode = cases takes its values from [[sweep.cases]] only")
+            raise Refusal("sweep", next(iter(axes)), "mode = cases takes its values from [[sweep.cases]] only")
         if not cases:
             raise Refusal("sweep.cases", [], "the sweep is empty: it needs a [[sweep.cases]] table or more")
         return
@@ -440,7 +419,7 @@ def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> No
         raise Refusal("sweep.mode", mode, "[[sweep.cases]] goes with another mode", "cases")
     if not axes:
         raise Refusal("sweep", None, 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
-    lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
+    lengths = {path: len(values) for path, values in axes.items() if len(values) > 1}
     if mode == "zip" and len(set(lengths.values())) > 1:
         counts = some(f"{path} has {count}" for path, count in lengths.items())
         raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {counts}")

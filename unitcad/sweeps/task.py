@@ -6,9 +6,11 @@ import contextlib
 import errno
 import time
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
+
+from msgspec import structs
 
 from unitcad import files
 from unitcad.cache import DiskStore, default_root, digest
@@ -19,7 +21,7 @@ from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes, row
 from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.subjects import subject_of_text
 from unitcad.spec import custom_code
-from unitcad.sweeps.journal import Values
+from unitcad.sweeps.journal import JournalEntry
 from unitcad.workers import limit
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
@@ -56,22 +58,7 @@ class Task:
     allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
 
-@dataclass(frozen=True)
-class VariantOutcome:
-    """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json."""
-
-    index: int
-    status: str
-    folder: str = ""
-    row: Values = field(default_factory=dict)
-    reason: str = ""
-    seconds: float = 0.0
-    built: int = 0
-    reused: int = 0
-    manifest: str = ""
-
-
-def work(task: Task) -> list[VariantOutcome]:
+def work(task: Task) -> list[JournalEntry]:
     """Make a task's variants; when they return, all is on the disk. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
@@ -85,7 +72,7 @@ def work(task: Task) -> list[VariantOutcome]:
     return done
 
 
-def _timed(job: Job, task: Task, scratch: Path) -> VariantOutcome:
+def _timed(job: Job, task: Task, scratch: Path) -> JournalEntry:
     """Make a variant within the task's time; an error is its outcome."""
     start = time.perf_counter()
     try:
@@ -93,47 +80,37 @@ def _timed(job: Job, task: Task, scratch: Path) -> VariantOutcome:
             outcome = _make(job, task, scratch)
     except Exception as error:
         outcome = failure(job.index, error)
-    return replace(outcome, seconds=time.perf_counter() - start)
+    return structs.replace(outcome, seconds=time.perf_counter() - start)
 
 
-def failure(index: int, error: BaseException) -> VariantOutcome:
+def failure(index: int, error: BaseException) -> JournalEntry:
     """Return the outcome of a variant that raised an error."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return VariantOutcome(index, NO_SPACE, reason=f"no space left ({error.filename or error.strerror})")
+        return JournalEntry(index, NO_SPACE, f"no space left ({error.filename or error.strerror})")
     if isinstance(error, Refusal):
-        return VariantOutcome(index, REFUSED, reason=str(error))
+        return JournalEntry(index, REFUSED, str(error))
     text = str(error) if isinstance(error, UnitcadError) else f"{type(error).__name__}: {error}"
-    return VariantOutcome(index, FAILED, reason=" ".join(text.split()))
+    return JournalEntry(index, FAILED, " ".join(text.split()))
 
 
-def _make(job: Job, task: Task, scratch: Path) -> VariantOutcome:
+def _make(job: Job, task: Task, scratch: Path) -> JournalEntry:
     """Make a variant into its folder in `task.out`."""
     spec = subject_of_text(job.spec)
     folder = task.out / spec.folder_name
     manifest = _finished_manifest(folder, spec, task, job.damaged)
     if manifest is not None:
-        return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
-    store = _store(task.cache or default_root())
-    before = Counter(store.counts)
-    built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
-    return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
-
-
-def _outcome(
-    job: Job, spec: Subject, folder: str, manifest: Manifest, sha256: str, counts: Counter[str]
-) -> VariantOutcome:
-    """Return the outcome of a variant that is there; `sha256` is that of its manifest.json."""
+        sha256, reused = _manifest_sha256(folder), True
+    else:
+        store = _store(task.cache or default_root())
+        before = Counter(store.counts)
+        built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
+        manifest, sha256, counts = built.manifest, built.sha256, store.counts - before
+        built_any, reused_any = (counts[f"file {what}"] + counts[f"data {what}"] for what in ("built", "reused"))
+        reused = bool(reused_any and not built_any)
     codes = failed_codes(manifest)
-    return VariantOutcome(
-        job.index,
-        BROKEN if codes else OK,
-        folder,
-        row(spec.unit, manifest),
-        f"broken: {', '.join(codes)}" if codes else "",
-        manifest=sha256,
-        built=counts["file built"] + counts["data built"],
-        reused=counts["file reused"] + counts["data reused"],
-    )
+    status, reason = (BROKEN, f"broken: {', '.join(codes)}") if codes else (OK, "")
+    values = row(spec.unit, manifest)
+    return JournalEntry(job.index, status, reason, folder.name, row=values, manifest=sha256, reused=reused)
 
 
 def _manifest_sha256(folder: Path) -> str:
@@ -149,7 +126,7 @@ def _finished_manifest(folder: Path, spec: Subject, task: Task, damaged: str) ->
         return None
     if damaged:
         with contextlib.suppress(UnitcadError):
-            if digest(files.read(folder / "manifest.json", links=False)) == damaged:
+            if _manifest_sha256(folder) == damaged:
                 return None
         folders.earlier_formats(folder, spec, ours=True)
         return None

@@ -211,7 +211,7 @@
       buttons();
       if (!faults.length) await shown(answer);
       pinned.show();
-      window.unitcad.timings.push({ what: "unit", ms: performance.now() - begun, server: answer.milliseconds, processor: answer.processor_ms, faults: faults.length });
+      window.unitcad.timings.push({ what: "unit", ms: performance.now() - begun, processor: answer.processor_ms, faults: faults.length });
       document.documentElement.dataset.ready = "yes";
       if (faults.length) {
         said("bad", unread.length ? "the text can't be read" : faults.length === 1 ? "1 value is refused" : `${faults.length} values are refused`);
@@ -251,7 +251,7 @@
     }
 
     async function rest(mine, begun) {
-      const time = (what, answer) => window.unitcad.timings.push({ what, ms: performance.now() - begun, server: answer.milliseconds, processor: answer.processor_ms, faults: (answer.faults || []).length });
+      const time = (what, answer) => window.unitcad.timings.push({ what, ms: performance.now() - begun, processor: answer.processor_ms, faults: (answer.faults || []).length });
       chip.textContent = "judging the moulds";
       await Promise.all([
         server.ask("estimate", state.text).then((answer) => {
