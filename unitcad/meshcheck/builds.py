@@ -23,7 +23,7 @@ from unitcad.meshcheck.geometry.topology import diagonals, topology_of
 from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.read_3mf import SOLID, Build, Instance, Key, read_build
 from unitcad.meshcheck.readers.read_step import Measured, measured
-from unitcad.meshcheck.readers.threemf_package import Package, open_package
+from unitcad.meshcheck.readers.threemf_package import open_package
 from unitcad.meshcheck.rules import g_shells, registry, s_scale, v_values
 from unitcad.meshcheck.rules.f_file import F001, F012, Deadline, Unreadable, keeping
 from unitcad.meshcheck.rules.g_crossing import G001
@@ -190,40 +190,28 @@ def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[l
     try:
         with keeping(package.findings):
             build = read_build(package, options.limits)
-            findings, facts = _geometry(build, options, deadline, package.findings)
+            found, facts = _geometry(build, options, deadline, package.findings)
+            findings = list(found)
     except Unreadable as stop:  # its facts are one object's
         findings, facts = list(stop.findings), Facts()
-    return [_with_part_names(package, item) for item in findings], facts
+    for i, item in enumerate(findings):
+        places = (replace(place, part=place.part and package.shown(place.part)) for place in item.locations)
+        findings[i] = replace(item, locations=tuple(places))
+    return findings, facts
 
 
-def _with_part_names(package: Package, item: Finding) -> Finding:
-    """Return the finding with its places' parts as the package writes them."""
-    return replace(
-        item,
-        locations=tuple(
-            replace(place, part=package.shown(place.part)) if place.part else place for place in item.locations
-        ),
-    )
+def _measure_turned(instance: Instance) -> tuple[Floats, float, float]:
+    """Measure an object under the linear part of its transform: box (2, 3) mm, area mm2, and the factor on its volume.
 
-
-@dataclass(frozen=True)
-class _Turned:
-    """An object under the linear part of a transform: its box (2, 3) mm, area mm2, and the factor on its volume."""
-
-    box: Floats
-    area: float
-    scale: float
-
-
-def _measure_turned(instance: Instance) -> _Turned:
-    """Measure once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
+    Done once for all instances that differ by a shift: adding it to the box rounds as it does every vertex.
+    """
     linear = instance.matrix[:3]
     with np.errstate(all="ignore"):
         points = (instance.triangles.vertices @ linear) * instance.unit_mm
         corners = instance.triangles.rows[:, :3]
         a, b, c = (points[corner] for corner in corners.T)
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
-        return _Turned(np.stack(extent(np.concatenate([a, b, c]))), area, abs(float(np.linalg.det(linear))))
+        return np.stack(extent(np.concatenate([a, b, c]))), area, abs(float(np.linalg.det(linear)))
 
 
 def _geometry(
@@ -236,7 +224,7 @@ def _geometry(
     if not instances:
         return ending(findings), Facts(triangles=0, vertices=0, shells=0)
     checked: dict[Key, CheckedMesh] = {}
-    turned: dict[tuple[Key, bytes], _Turned] = {}
+    turned: dict[tuple[Key, bytes], tuple[Floats, float, float]] = {}
     for instance in instances:
         if instance.key not in checked:
             checked[instance.key] = _check_object(instance, options, deadline)
@@ -244,8 +232,9 @@ def _geometry(
         if instance.linear not in turned:
             turned[instance.linear] = _measure_turned(instance)
         deadline.tick()
-    each = [(checked[instance.key].facts, turned[instance.linear]) for instance in instances]
-    boxes = np.stack([one.box for _, one in each])
+    each = [checked[instance.key].facts for instance in instances]
+    sizes, areas, scales = zip(*(turned[instance.linear] for instance in instances), strict=True)
+    boxes = np.stack(sizes)
     with np.errstate(all="ignore"):
         corners = boxes + np.stack([instance.shift for instance in instances])[:, None]
     beyond = ~(np.abs(corners) <= LARGEST).all(axis=(1, 2))
@@ -255,17 +244,17 @@ def _geometry(
         return ending(findings), Facts()
     findings += v_values.too_far(corners, diagonals(boxes[:, 0], boxes[:, 1]))
     findings += g_shells.specks(corners[:, 0], corners[:, 1], np.ones(len(corners), bool))
-    volumes = [(facts.volume_mm3 or 0.0) * one.scale for facts, one in each]
+    volumes = [(facts.volume_mm3 or 0.0) * scale for facts, scale in zip(each, scales, strict=True)]
     whole = Facts(
-        triangles=sum(facts.triangles or 0 for facts, _ in each),
-        vertices=sum(facts.vertices or 0 for facts, _ in each),
-        shells=sum(facts.shells or 0 for facts, _ in each),
-        volume_mm3=sum(volumes) if all(facts.volume_mm3 is not None for facts, _ in each) else None,
-        area_mm2=sum(one.area for _, one in each),
+        triangles=sum(facts.triangles or 0 for facts in each),
+        vertices=sum(facts.vertices or 0 for facts in each),
+        shells=sum(facts.shells or 0 for facts in each),
+        volume_mm3=sum(volumes) if all(facts.volume_mm3 is not None for facts in each) else None,
+        area_mm2=sum(areas),
         bbox_mm=(point(corners[:, 0].min(axis=0)), point(corners[:, 1].max(axis=0))),
-        watertight=all(facts.watertight for facts, _ in each),
+        watertight=all(facts.watertight for facts in each),
     )
-    solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
+    solids = ((facts.watertight and volume > 0) for facts, volume in zip(each, volumes, strict=True))
     sound = (
         Solid(instance.mesh(placed=True), volume, str(instance.object.id))
         for instance, volume in compress(zip(instances, volumes, strict=True), solids)

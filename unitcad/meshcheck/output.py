@@ -206,7 +206,9 @@ def _rule(rule: Rule) -> dict[str, Any]:
 
 
 def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict[str, Any]:
-    uri = _uri(report.path)
+    file = Path(report.path)
+    relative = quote(file.as_posix().encode("utf-8", "surrogateescape"), safe="/")
+    uri = file.as_uri() if file.is_absolute() else relative
     physical: dict[str, Any] = {"artifactLocation": {"uri": uri}}
     line = first_line(finding)
     if line is not None:
@@ -221,14 +223,6 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
         "locations": [{"physicalLocation": physical, **logical}],
         "properties": {"count": finding.count, "places": [place.as_dict() for place in finding.locations]},
     }
-
-
-def _uri(path: str) -> str:
-    """Return a relative path as a URI reference; an absolute one as a file: URI."""
-    file = Path(path)
-    if file.is_absolute():
-        return file.as_uri()
-    return quote(file.as_posix().encode("utf-8", "surrogateescape"), safe="/")
 
 
 FORMATS = ("text", "json", "github", "sarif", "junit", "markdown")

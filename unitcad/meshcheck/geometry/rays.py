@@ -8,13 +8,10 @@ import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import Tick, boxes_of, frame_of, meeting_between, morton_order
+from unitcad.meshcheck.geometry.sieves import dot
 from unitcad.meshcheck.geometry.topology import Topology, max_side_squared
 
 _FACES = 1 << 13  # faces looked at together
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def winding_numbers(vertices: Floats, faces: Ints, first: Ints, count: Ints, points: Floats, tick: Tick) -> Ints:
@@ -39,11 +36,11 @@ def winding_numbers(vertices: Floats, faces: Ints, first: Ints, count: Ints, poi
 def _half_angles(vertices: Floats, faces: Ints, points: Floats) -> Floats:
     """Return half of the solid angle under which each face is seen from a point, (n,)."""
     a, b, c = (np.ascontiguousarray((vertices.take(faces[:, k], axis=0) - points).T) for k in range(3))
-    la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
+    la, lb, lc = (np.sqrt(dot(v, v)) for v in (a, b, c))
     top = a[0] * (b[1] * c[2] - b[2] * c[1])
     top += a[1] * (b[2] * c[0] - b[0] * c[2])
     top += a[2] * (b[0] * c[1] - b[1] * c[0])
-    low = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+    low = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
     return np.asarray(np.arctan2(top, low))
 
 

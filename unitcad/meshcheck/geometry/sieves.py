@@ -143,22 +143,22 @@ def height_fields(columns: Floats, corners: Ints, areas: Floats, whole: Bools) -
     share, angle, steep = np.empty(m), np.empty((3, m)), np.empty((3, m), bool)
     for block in blocks:
         here = list(areas[:, block])
-        size = np.sqrt(_dot(here, here))
+        size = np.sqrt(dot(here, here))
         sides = _sides_of(columns, corners[:, block])
-        longest = np.maximum.reduce([_dot(side, side) for side in sides])
+        longest = np.maximum.reduce([dot(side, side) for side in sides])
         share[block] = 1 / np.where(size > _SOUND * longest, size, np.inf)
         for k in range(3):  # a normal counts by the angle of its face there, however many faces a fan is cut into
-            np.arctan2(size, -_dot(sides[k], sides[k - 1]), out=angle[k, block])
+            np.arctan2(size, -dot(sides[k], sides[k - 1]), out=angle[k, block])
     angle *= share
     along = [np.add.reduce([np.bincount(corners[k], angle[k] * area, n) for k in range(3)]) for area in areas]
-    length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
+    length = np.maximum(np.sqrt(dot(along, along)), 1e-300)
     along = [part / length for part in along]
     for block in blocks:
         sides, here = _sides_of(columns, corners[:, block]), list(areas[:, block])
         for k, corner in enumerate(corners[:, block]):
             up = [part.take(corner) for part in along]
-            double = _dot(here, up)
-            flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
+            double = dot(here, up)
+            flat = dot(sides[k], up) * dot(sides[k - 1], up) - dot(sides[k], sides[k - 1])
             steep[k, block] = double * share[block] <= _FACING
             np.arctan2(double, flat, out=angle[k, block])
     turns, seen = np.zeros(n), whole.copy()
@@ -174,5 +174,6 @@ def _sides_of(columns: Floats, ids: Ints) -> list[list[Floats]]:
     return [[at[(k + 1) % 3][axis] - at[k][axis] for axis in range(3)] for k in range(3)]
 
 
-def _dot(a: list[Floats], b: list[Floats]) -> Floats:
+def dot(a: Floats | list[Floats], b: Floats | list[Floats]) -> Floats:
+    """Return the products of vectors by axis."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -23,7 +23,7 @@ It returns None if the findings leave no mesh, and raises `Unreadable` if it can
 """
 _READ = "read_"
 SUFFIXES = {f".{name.removeprefix(_READ)}" for _, name, _ in iter_modules(__path__) if name.startswith(_READ)}
-SUFFIXES |= {".3mf", ".stp"}
+SUFFIXES |= {".stp"}
 _MAGIC = (
     (b"PK\x03\x04", "zip"),
     (b"PK\x05\x06", "zip"),

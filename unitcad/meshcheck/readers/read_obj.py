@@ -49,7 +49,7 @@ def read_obj(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
         _take(block, line, state)
         if max(state.n_vertices, state.n_corners) > 3 * limits.max_faces + 2:
             raise F011.unreadable(f"more faces or vertices than --max-faces {limits.max_faces} allows")
-    return mesh_of(_polygons(state), limits, deadline, findings)
+    return mesh_of(_polygons(state), limits, deadline, findings, counts_from=1)
 
 
 def _polygons(state: _Read) -> Polygons:
@@ -61,9 +61,7 @@ def _polygons(state: _Read) -> Polygons:
         names=b"".join(names for _, names in named),
     )
     vertices = np.concatenate([np.empty((0, 3)), *state.vertices])
-    return Polygons(
-        vertices, np.concatenate([empty, *state.corners]), np.concatenate([empty, *state.sizes]), source, counts_from=1
-    )
+    return vertices, np.concatenate([empty, *state.corners]), np.concatenate([empty, *state.sizes]), source
 
 
 def _take(block: Ints, line: int, state: _Read) -> None:

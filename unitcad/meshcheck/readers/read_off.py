@@ -47,4 +47,4 @@ def _polygons(table: Rows, size: int, limits: Limits, findings: list[Finding]) -
     begins, lines = table.starts[:-1][faces], table.lines[faces]
     numbers = rows.lengths(table.values[begins], sizes[faces] - 1, lines)
     corners = rows.integers(table.values[rows.spread(begins + 1, numbers)])
-    return Polygons(rows.columns(table, points, 3), corners, numbers, Source(lines=lines))
+    return rows.columns(table, points, 3), corners, numbers, Source(lines=lines)

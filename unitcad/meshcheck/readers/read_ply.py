@@ -18,7 +18,7 @@ from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
 from unitcad.meshcheck.readers.rows import Polygons, Rows, check_promise, mesh_of
-from unitcad.meshcheck.rules.f_file import F001, F002, F003, F005, F006, Deadline, Limits, Unreadable
+from unitcad.meshcheck.rules.f_file import F001, F002, F003, F005, F006, Deadline, Limits
 
 _TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
 _TYPES |= {"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"}
@@ -69,7 +69,7 @@ def _polygons(elements: list[_Element], tables: Tables, lines: Ints | None) -> P
         raise F003.unreadable("cannot be read as PLY: its elements are not those of a mesh")
     vertices = np.stack([np.asarray(column, np.float64) for _, column in points], axis=1)
     indices = rows.integers(corners) if corners.dtype.kind == "f" else corners.astype(np.int64)
-    return Polygons(vertices, indices, sizes, Source(lines=lines))
+    return vertices, indices, sizes, Source(lines=lines)
 
 
 def _header(raw: bytes) -> tuple[str, list[_Element], int]:
@@ -217,7 +217,10 @@ def _walk_rows(raw: bytes, at: int, element: _Element, order: str, deadline: Dea
                 kept[i][1].append(n if size else 1)
             at = first + n * size
         if at > len(raw):
-            raise _short(element, done)
+            text = (
+                f"the header promises {counted(element.count, f'{element.name} record')}, the file has room for {done}"
+            )
+            raise F002.unreadable(text, max(element.count - done, 1))
     columns: dict[str, Column] = {}
     for i, (starts, counts) in kept.items():
         name, length, kind = element.properties[i]
@@ -227,8 +230,3 @@ def _walk_rows(raw: bytes, at: int, element: _Element, order: str, deadline: Dea
         values = numbers[rows.spread(np.frombuffer(starts, np.int64), sizes, size)]
         columns[name] = (sizes if length else None, values)
     return columns, at
-
-
-def _short(element: _Element, room: int) -> Unreadable:
-    text = f"the header promises {counted(element.count, f'{element.name} record')}, the file has room for {room}"
-    return F002.unreadable(text, max(element.count - room, 1))

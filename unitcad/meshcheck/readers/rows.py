@@ -251,20 +251,6 @@ _CHUNK = 50_000  # corners looked at together
 _PROPER = 1e-12  # least area of a fan's triangle, as part of the squared length of its polygon
 
 
-@dataclass(frozen=True)
-class Polygons:
-    """Vertices (n, 3) mm, the corners of all polygons one after the other (c,), and how many each has (p,).
-
-    `source`: their places in the file. `counts_from` is the format's first index, for messages.
-    """
-
-    vertices: Floats
-    corners: Ints
-    sizes: Ints
-    source: Source
-    counts_from: int = 0
-
-
 def check_promise(n: int, size: int, limits: Limits) -> None:
     """Raise `Unreadable` if a header promises more vertices or faces than the limits (F011) or the file (F002)."""
     if n > 3 * limits.max_faces:
@@ -273,12 +259,19 @@ def check_promise(n: int, size: int, limits: Limits) -> None:
         raise F002.unreadable(f"{n} vertices or faces promised in {size} bytes")
 
 
-def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
+Polygons = tuple[Floats, Ints, Ints, Source]
+"""Vertices (n, 3) mm, corners of all polygons (c,), how many each has (p,), and their places in the file."""
+
+
+def mesh_of(
+    polygons: Polygons, limits: Limits, deadline: Deadline, findings: list[Finding], counts_from: int = 0
+) -> Mesh | None:
     """Return the mesh, none if a vertex is not finite, and add the faults of the polygons to the findings.
 
+    `counts_from`: the format's first index, for messages.
     Raises `Unreadable` if there is no polygon (F001), too many (F011), or one names a missing vertex (P011).
     """
-    sizes, source = polygons.sizes, polygons.source
+    vertices, corners, sizes, source = polygons
     short = np.flatnonzero(sizes < 3)
     if len(short):
         text = f"{counted(len(short), 'face')} with fewer than three vertices"
@@ -286,12 +279,11 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: li
     if len(sizes) == len(short):
         raise F001.unreadable("the file has no face")
     limits.check_faces(int(np.maximum(sizes - 2, 0).sum()))
-    vertices, corners = polygons.vertices, polygons.corners
     missing = np.flatnonzero((corners < 0) | (corners >= len(vertices)))
     if len(missing):
         wrong = missing[0]
-        counting = "" if polygons.counts_from else ", counted from 0"
-        text = f"a face names vertex {corners[wrong] + polygons.counts_from} of {len(vertices)}{counting}"
+        counting = "" if counts_from else ", counted from 0"
+        text = f"a face names vertex {corners[wrong] + counts_from} of {len(vertices)}{counting}"
         raise P011.unreadable(text, places=_places(source, np.searchsorted(np.cumsum(sizes), [wrong], "right")))
     used = np.zeros(len(vertices), bool)
     used[corners] = True

@@ -105,19 +105,13 @@ def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> Fl
             along = sides[i, k] / lengths[i, k]
             if abs(along[2]) > _STANDS or np.ptp(corners @ along) < least:
                 continue
-            frame = _frame(along)
+            x = np.cross(np.eye(3)[np.argmin(np.abs(along))], along)
+            x /= np.linalg.norm(x)
+            frame = np.stack([x, np.cross(along, x), along])  # turns `along` to z
             turned = solid.transform(np.column_stack([frame, np.zeros(3)]))
             if all(_narrow_at(turned, frame @ middle, shift, least) for shift in (0, -0.75 * least, 0.75 * least)):
                 return middle
     return None
-
-
-def _frame(along: Floats) -> Floats:
-    """Return a rotation (3, 3) that turns the unit vector `along` to z."""
-    beside = np.eye(3)[np.argmin(np.abs(along))]
-    x = np.cross(beside, along)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(along, x), along])
 
 
 def _narrow_at(turned: Manifold, point: Floats, shift: float, least: float) -> bool:
