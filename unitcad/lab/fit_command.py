@@ -115,13 +115,6 @@ def warnings(result: Fitted) -> list[str]:
     ]
 
 
-def against_text(one: ModelFit) -> str:
-    """Return the paired difference to the baseline in ln, with its standard error and p."""
-    if one.against_baseline is None:
-        return "-"
-    return f"{one.against_baseline:+.2f} +- {one.against_baseline_error:.2f}, p {one.against_baseline_p:.2g}"
-
-
 def leads_text(result: Fitted) -> str:
     """Say which model leads, by which rule, and the test that decided."""
     judged = result.judged
@@ -156,7 +149,11 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
         one = result.fit.model[name]
         own = ["-" if value is None else f"{value:.2f}" for value in (one.own_leave_one_out, one.own_by_stored)]
         score = f"{one.leave_one_out:.2f} ({one.leave_one_out_low:.2f} to {one.leave_one_out_high:.2f})"
-        models.append([name, score, *own, against_text(one), one.coverage])
+        against = "-"  # of the baseline itself
+        if one.against_baseline is not None:
+            error, p = one.against_baseline_error, one.against_baseline_p
+            against = f"{one.against_baseline:+.2f} +- {error:.2f}, p {p:.2g}"
+        models.append([name, score, *own, against, one.coverage])
     units = [["unit", "measured", "predicted", "P10", "P90"]]
     for row in unit_rows(result):
         numbers = (f"{row[key]:.3g}" for key in ("measured", "predicted", "p10", "p90"))
