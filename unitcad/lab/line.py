@@ -96,7 +96,8 @@ def fit_line(
         frequency, spread = float(frequencies.mean()), float(np.ptp(frequencies))
         orders = mains_orders(mains_hz, rate, (frequency,), length, spread)
         line = line_columns(phase(here), frequency, rate)
-        columns = np.concatenate([line, mains_columns(here, mains_hz, orders), trend_columns(here)])
+        mains = _waves(np.exp(2j * np.pi * mains_hz * np.array(orders, float)[:, None] * here))
+        columns = np.concatenate([line, mains, trend_columns(here)])
         use = known[inside]
         if use.sum() < LEAST_SAMPLES:
             return None
@@ -239,11 +240,6 @@ def mains_orders(
     taken = [line * k for line in lines for k in range(1, HARMONICS + 1)]
     away = RESOLVED / length_s + spread_hz / 2
     return [m for m in range(1, highest + 1) if all(abs(m * mains_hz - one) > away for one in taken)]
-
-
-def mains_columns(time: Floats, mains_hz: float, orders: list[int]) -> Floats:
-    """Return cosine and sine (2 orders, n) of multiples of the mains' frequency."""
-    return _waves(np.exp(2j * np.pi * mains_hz * np.array(orders, float)[:, None] * time))
 
 
 def trend_columns(time: Floats) -> Floats:

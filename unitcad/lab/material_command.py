@@ -12,7 +12,7 @@ import typer
 
 from unitcad import catalogue, files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.catalogue import Material, MaterialEntry, choose, materials
+from unitcad.catalogue import Material, MaterialEntry, choose
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
 from unitcad.errors import Refusal
@@ -54,12 +54,6 @@ def entry_of(tensile: TensileResult | None, dynamic: DynamicResult | None, like:
     if dynamic:
         entry.update(_dynamic(dynamic))
     return entry
-
-
-def expect_loadable(name: str, entry: Mapping[str, Any]) -> None:
-    """Hold the entry to the catalogue's own types and limits, as a spec would. Raises Refusal."""
-
-    materials({name: convert(dict(entry), MaterialEntry, f"materials.{name}")})
 
 
 def material_toml(name: str, entry: Mapping[str, Any], comments: tuple[str, ...]) -> str:
@@ -244,7 +238,8 @@ def material(
         ratio = float(base.poisson_ratio)
         dynamic = evaluate_dynamic(moduli, frequency_hz, ratio) if moduli else None
     entry = entry_of(tensile, dynamic, base.name, frequency_hz)
-    expect_loadable(named, entry)
+    # The catalogue's own types and limits hold it, as in a spec.
+    catalogue.materials({named: convert(entry, MaterialEntry, f"materials.{named}")})
     text = material_toml(named, entry, _comments(entry, base))
     found = as_data(named, entry, tensile, dynamic, frequency_hz)
     if out is not None:

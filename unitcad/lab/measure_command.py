@@ -82,18 +82,6 @@ def as_data(result: Measured) -> dict[str, Any]:
     }
 
 
-def lines(result: Measured) -> Iterator[str]:
-    """Yield the levels as lines for a person."""
-    for one in result.levels:
-        value = f"{one.level.value:.3f} ({one.level.low:.3f} to {one.level.high:.3f})"
-        yield (
-            f"{one.unit}, {_place(one.distance_mm)}, {one.chain}: {value} of the motor's amplitude, "
-            f"{one.frequency_hz:.1f} Hz"
-        )
-    if assumed := _assumed(result):
-        yield f"  {assumed}"
-
-
 _STYLE = """:root{color-scheme:light dark;--text:#222;--back:#fff;--edge:#ccc;--error:#a11;--warning:#850}
 @media(prefers-color-scheme:dark){:root{--text:#ddd;--back:#181a1b;--edge:#555;--error:#f99;--warning:#eb6}}
 body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:var(--text);
@@ -131,32 +119,25 @@ def page(result: Measured) -> str:
         records.append((*row, r.sha256[:12]))
     head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
     head = (*head, "gain of bandpass", "SHA-256")
-    return _document(
-        result.campaign.name,
+    name, place = escape(result.campaign.name), ("unit", "place", "chain", "level", "95 %", "repeats", "Hz")
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+        f"<title>{name}</title><style>{_STYLE}</style></head><body><h1>{name}</h1>"
         f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
-        + (_table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels) if levels else _NO_LEVEL)
+        + (_table(place, levels) if levels else "<p>None: see the findings.</p>")
         + (f"<p>{escape(assumed)}.</p>" if assumed else "")
-        + f"{_figures(_decay_charts(result))}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        + f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
         "<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
-        "comes from the scatter of the repeats.</p>" + _table(head, records) + f"<h2>Charts of the records</h2>{drawn}",
+        "comes from the scatter of the repeats.</p>"
+        f"{_table(head, records)}<h2>Charts of the records</h2>{drawn}</body></html>\n"
     )
-
-
-_NO_LEVEL = "<p>None: see the findings.</p>"
 
 
 def _assumed(result: Measured) -> str:
     """State the values that the chain bandpass assumes, if it was used."""
     return f"Chain bandpass, assumed: {bandpass.ASSUMED}" if "bandpass" in result.campaign.chain.use else ""
-
-
-def _document(name: str, body: str) -> str:
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width">'
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-        f"<title>{escape(name)}</title><style>{_STYLE}</style></head><body><h1>{escape(name)}</h1>{body}</body></html>\n"
-    )
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
@@ -173,8 +154,6 @@ STRETCHES = 100
 """Parts of a record of which its chart shows the least and the largest value."""
 BESIDE_HZ = 30.0
 """Width of a spectrum to either side of the line: one multiple of 50 Hz at least."""
-LEAST_WIDE_MM = 10.0
-"""Smallest span of the axis of distances."""
 
 
 def _record_charts(record: RecordResult) -> list[str]:
@@ -201,19 +180,6 @@ def _record_charts(record: RecordResult) -> list[str]:
         chart(whole, f"{record.file}: whole record", "time, s", unit),
         chart(series, f"{record.file}: spectrum", "frequency, Hz", amplitude, log_y=True, x_range=span),
     ]
-
-
-def _decay_charts(result: Measured) -> Iterator[str]:
-    """Chart each unit's levels of the first chain over the distance, as SVG."""
-    for unit in result.campaign.unit:
-        levels = [one for one in result.levels if (one.unit, one.chain) == (unit.name, result.campaign.chain.use[0])]
-        if levels:
-            x = [one.distance_mm for one in levels]
-            bars = [(one.level.low, one.level.high) for one in levels]
-            wide = max(LEAST_WIDE_MM, *x)
-            series = [Series("95 % interval", x, [one.level.value for one in levels], points=True, bars=bars)]
-            title = f"{unit.name}: level over the distance from the edge"
-            yield chart(series, title, "distance, mm", "level", log_y=True, x_range=(-0.03 * wide, 1.03 * wide))
 
 
 def _figures(charts: Iterable[str]) -> str:
@@ -248,8 +214,12 @@ def measure(
     if as_json:
         print_json({"folder": str(folder), **as_data(result)})
     else:
-        for line in lines(result):
-            typer.echo(line)
+        for one in result.levels:
+            value = f"{one.level.value:.3f} ({one.level.low:.3f} to {one.level.high:.3f})"
+            place = f"{one.unit}, {_place(one.distance_mm)}, {one.chain}"
+            typer.echo(f"{place}: {value} of the motor's amplitude, {one.frequency_hz:.1f} Hz")
+        if assumed := _assumed(result):
+            typer.echo(f"  {assumed}")
         typer.echo(str(folder))
     if result.findings:
         sys.exit(1)

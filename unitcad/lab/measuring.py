@@ -65,8 +65,7 @@ def level(amplitudes: Sequence[float], references: Sequence[float] | None = None
     weights = sum(part**2 / (count - 1) for part, count in zip(parts, counts, strict=True))
     freedom = sum(parts) ** 2 / weights if weights > 0 else float(sum(counts) - len(counts))
     log = means[0] - sum(means[1:])
-    quantile = (1 + COVERAGE) / 2
-    half = float(t.ppf(quantile, freedom)) * math.sqrt(sum(parts))
+    half = float(t.ppf((1 + COVERAGE) / 2, freedom)) * math.sqrt(sum(parts))
     ends = (math.exp(log), math.exp(log - half), math.exp(log + half))
     return Level(*ends, (counts[0], counts[-1]), math.sqrt(max(variances)))
 
@@ -117,12 +116,7 @@ def _places(unit: UnitTable) -> list[tuple[str, float, tuple[str, ...]]]:
     return edge + [(f"{point.distance_mm:g} mm", point.distance_mm, point.records) for point in unit.point]
 
 
-def _records(
-    unit: UnitTable,
-    campaign: Campaign,
-    folder: Path,
-    say: Callable[[str], None],
-) -> list[RecordResult]:
+def _records(unit: UnitTable, campaign: Campaign, folder: Path, say: Callable[[str], None]) -> list[RecordResult]:
     """Measure a unit's records: the motor's first, near whose frequency the others' lines are looked for."""
     motor = campaign.motor_sensor or campaign.sensor
     band = campaign.chain.band_hz

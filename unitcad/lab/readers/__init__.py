@@ -7,6 +7,7 @@ import functools
 import os
 import pkgutil
 import re
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -253,11 +254,16 @@ def open_recording(path: Path, layout: Layout = AS_FOUND) -> Recording:
 
 def _read_in(folder: str, module: str, path: Path, layout: Layout) -> list[Channel]:
     os.chdir(folder)
-    return _read(module, path, layout)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return _read(module, path, layout)
 
 
 def _read(module: str, path: Path, layout: Layout) -> list[Channel]:
-    return import_module(f"{__name__}.{module}").read(path, layout)
+    found = import_module(f"{__name__}.{module}").read(path, layout)
+    if not found:
+        raise Unreadable(str(path), None, "has no channel of numbers")
+    return found
 
 
 @functools.cache

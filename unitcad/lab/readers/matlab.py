@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from math import prod
 from pathlib import Path
@@ -20,22 +19,15 @@ DEEPEST = 3
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
-    """Return the numeric vectors and the columns of matrices, as their longer side runs. Raises Unreadable."""
+    """Return the numeric vectors and the columns of matrices, as their longer side runs."""
     with open(path, "rb") as file:
         first = file.read(16)
     if path.suffix.lower() != ".mat" or first.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")):
         return _read_hdf5(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        listed = whosmat(str(path))
-        names = [
-            name for name, _, kind in listed if kind.removeprefix("u").startswith(("int", "double", "single", "struct"))
-        ]
-        data = loadmat(str(path), variable_names=names, struct_as_record=False, squeeze_me=False)
-    found = [channel for name in names if name in data for channel in _columns(name, data[name], 0)]
-    if not found:
-        raise Unreadable(str(path), None, "has no vector and no matrix of numbers")
-    return found
+    kinds = ("int", "uint", "double", "single", "struct")
+    names = [name for name, _, kind in whosmat(str(path)) if kind.startswith(kinds)]
+    data = loadmat(str(path), variable_names=names, struct_as_record=False, squeeze_me=False)
+    return [channel for name in names if name in data for channel in _columns(name, data[name], 0)]
 
 
 def _columns(name: str, value: Any, depth: int) -> Iterator[Channel]:
@@ -47,9 +39,14 @@ def _columns(name: str, value: Any, depth: int) -> Iterator[Channel]:
         for field in fields or () if depth < DEEPEST else ():
             yield from _columns(f"{name}.{field}", getattr(value.flat[0], field), depth + 1)
     elif value.dtype.kind in "fiu" and max(value.shape) > 1:
-        matrix = value if value.shape[0] >= value.shape[1] else value.T
-        for i, column in enumerate(matrix.T, 1):
-            yield Channel(column, name if matrix.shape[1] == 1 else f"{name}:{i}")
+        yield from _channels(name, value)
+
+
+def _channels(name: str, table: np.ndarray, unit: str = "") -> Iterator[Channel]:
+    """Yield the channels of a matrix along its longer side."""
+    table = table if table.shape[0] >= table.shape[1] else table.T
+    for i, column in enumerate(table.T, 1):
+        yield Channel(column, name if table.shape[1] == 1 else f"{name}:{i}", unit)
 
 
 MOST_COLUMNS = 4096
@@ -74,17 +71,13 @@ def _read_hdf5(path: Path) -> list[Channel]:
         if node.id.get_type() not in (h5py.h5t.py_create(node.dtype), h5py.h5t.py_create(node.dtype.newbyteorder())):
             raise Unreadable(str(path), None, f"the numbers of {name} have no standard layout: it is damaged")
         table = node[:].reshape(len(node), -1)
-        table = table if table.shape[0] >= table.shape[1] else table.T
-        if table.shape[1] > MOST_COLUMNS:
+        if min(table.shape) > MOST_COLUMNS:
             return
         unit = next((_text(node.attrs[key]) for key in ("unit", "units") if key in node.attrs), "")
-        for i, column in enumerate(table.T, 1):
-            found.append(Channel(column, name if table.shape[1] == 1 else f"{name}:{i}", unit))
+        found.extend(_channels(name, table, unit))
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
-    if not found:
-        raise Unreadable(str(path), None, "has no data set of numbers")
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +23,11 @@ def read(path: Path, layout: Layout) -> list[Channel]:
 
     if not path.read_bytes().rstrip().endswith(b"-1"):
         raise Unreadable(str(path), None, "is cut off: it does not end with the -1 that closes a data set")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        file = pyuff.UFF(str(path))
-        kinds = [int(kind) for kind in file.get_set_types()]
-        if 0 in kinds:
-            raise Unreadable(str(path), None, f"the type of its data set {kinds.index(0) + 1} can't be read")
-        sets: list[Any] = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+    file = pyuff.UFF(str(path))
+    kinds = [int(kind) for kind in file.get_set_types()]
+    if 0 in kinds:
+        raise Unreadable(str(path), None, f"the type of its data set {kinds.index(0) + 1} can't be read")
+    sets: list[Any] = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
     records = [one for one in sets if int(one["func_type"]) in TIME_RESPONSE]
     if not records:
         listed = ", ".join(map(str, kinds)) or "none"
