@@ -235,8 +235,9 @@ def survey_specs(count: int, seed: int, say: Say) -> dict[str, Any]:
     extreme = max(1, round(EXTREME_SHARE * count))
     number = {"documented": count - extreme, "extreme": extreme}
     jobs = [(ranges, 100_000 * seed + i) for ranges in RANGES for i in range(number[ranges])]
+    hung = Outcome(HANG, f"no answer within {SPEC_S:g} s of processor time")
     outcomes: list[Outcome] = []
-    for i, found in enumerate(in_order(_spec, jobs, SPEC_S, _hung, _SERIAL)):
+    for i, found in enumerate(in_order(_spec, jobs, SPEC_S, lambda job: hung, _SERIAL)):
         say(f"random specs: {i + 1} of {count}")
         outcomes.append(found)
     pairs = list(zip(jobs, outcomes, strict=True))
@@ -264,7 +265,3 @@ def survey_specs(count: int, seed: int, say: Say) -> dict[str, Any]:
 def _spec(job: Job) -> Outcome:
     """Return the outcome of a spec. Runs in a worker process."""
     return outcome(seeded_spec(job[1], job[0]))
-
-
-def _hung(job: Job) -> Outcome:
-    return Outcome(HANG, f"no answer within {SPEC_S:g} s of processor time")

@@ -77,6 +77,7 @@ def answer(
 
     With a lab's fit `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
     """
+    table = measured_table(variant.moduli)
     lead, errors = lead_of(variant.moduli, fit), leave_one_out_errors(variant.moduli, fit)
     expected = predictive_of([variant], fit)
     low, middle, high = (float(end[0]) for end in expected.range)
@@ -85,6 +86,9 @@ def answer(
     group = int(unit_class(nominal(variant))[0])
     stated = not far and levels[lead.model]["value"] is not None
     best = assessments(variant.moduli)[lead.model].leave_one_out
+    behind = [unit.value for unit in fit.measured] if fit else []
+    if fit is None or fit.include_paper_units:
+        behind.append(float(table.levels.max()))
     data: dict[str, Any] = {
         "model": lead.model if known else None,
         "level": measured[0]["level"] if measured else middle if stated else None,
@@ -96,13 +100,15 @@ def answer(
         "worst_error": None if fit else best.worst,
         "worst_at": None if fit else best.worst_at,
         "class": CLASSES[group],
-        "class_mean": _class_mean(variant, group, fit),
+        "class_mean": fit.model[BASELINE].constants[CLASSES[group]]
+        if fit
+        else float(np.exp(np.log(table.levels[table.classes == group]).mean())),
         "baseline_error": errors[BASELINE],
         "coverage": None if fit else coverage(variant.moduli),
         "measured": measured,
         "elsewhere": _of_paper(estimated) if fit else [],
         "nearest": _nearest(variant, fit),
-        "highest": _highest(fit),
+        "highest": max(behind),
         "analytic": {name: {**levels[name], "leave_one_out": errors[name]} for name in ANALYTIC},
     }
     headline = _headline(data, levels, fit)
@@ -150,14 +156,6 @@ def _of_paper(estimated: dict[str, Any]) -> list[dict[str, Any]]:
     return [{"level": level, "low": None, "high": None, "by": PAPER} for level in printed]
 
 
-def _class_mean(variant: EstimateInput, group: int, fit: LabFit | None) -> float:
-    """Return the baseline: the mean of the unit's class, by a lab's fit or of the paper's units."""
-    if fit:
-        return fit.model[BASELINE].constants[CLASSES[group]]
-    table = measured_table(variant.moduli)
-    return float(np.exp(np.log(table.levels[table.classes == group]).mean()))
-
-
 def _nearest(variant: EstimateInput, fit: LabFit | None) -> dict[str, Any]:
     """Return the nearest measured unit as `measured.nearest` does; with a fit, of the lab's own ones."""
     found = nearest(variant)
@@ -168,12 +166,6 @@ def _nearest(variant: EstimateInput, fit: LabFit | None) -> dict[str, Any]:
     apart = place - np.array(unit.place)
     silicones = ["silicones"] if not np.allclose(apart[LENGTHS:], 0.0) else []
     return {**found, "unit": unit.unit, "level": unit.value, "differs_in": [*silicones, *differing(apart)]}
-
-
-def _highest(fit: LabFit | None) -> float:
-    """Return the highest level behind the leading model."""
-    paper = [float(measured_table().levels.max())] if fit is None or fit.include_paper_units else []
-    return max([*paper, *(unit.value for unit in (fit.measured if fit else ()))])
 
 
 def _headline(data: dict[str, Any], levels: dict[str, Any], fit: LabFit | None) -> str:
@@ -407,7 +399,11 @@ def estimate(
         "assumptions": [
             *ASSUMPTIONS,
             *(f"A range, not a value: {note}" for note in range_notes(variant)),
-            *dict.fromkeys(_noted(variant)),
+            *dict.fromkeys(  # known, but not at the motor's frequency
+                f"{layer.material} youngs_modulus: {layer.youngs_modulus.note}"
+                for layer in variant.layers
+                if layer.youngs_modulus.note and layer.youngs_modulus.value is not None
+            ),
         ],
     }
     if fit:
@@ -512,12 +508,6 @@ def assessment_block(assessment: Assessment) -> dict[str, Any]:
             "ratios": asdict(assessment.leave_one_out_ratios) if assessment.leave_one_out_ratios else None,
         },
     }
-
-
-def _noted(variant: EstimateInput) -> list[str]:
-    """Return notes on moduli that are known but not at the motor's frequency."""
-    moduli = [(layer.material, layer.youngs_modulus) for layer in variant.layers]
-    return [f"{name} youngs_modulus: {one.note}" for name, one in moduli if one.note and one.value is not None]
 
 
 def _ends_of(ends: tuple[float, float]) -> dict[str, Any]:

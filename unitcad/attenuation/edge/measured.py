@@ -285,7 +285,8 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     extra = other_prints(design, layers)
     if not rows:
         return extra and {"level": None, **extra}
-    index, shared, differs = rows[0], measurements().unit, _differs_from_all(variant)
+    index, shared = rows[0], measurements().unit
+    differs = [*differing(coordinates_of(variant)), *_not_read(variant)]
     return {
         "level": float(table.levels[index]),
         **(extra or {}),
@@ -337,11 +338,6 @@ def nearest(variant: EstimateInput) -> dict[str, Any]:
 def _moduli(moduli: Any) -> np.ndarray:
     """Return ln modulus of the innermost and outermost layer of each unit of the table, shape (units, 2)."""
     return measured_table(moduli).mean(lambda units: np.log(units.youngs_modulus[..., [0, -1]]))
-
-
-def _differs_from_all(variant: EstimateInput) -> list[str]:
-    """Return the inputs that the measured units share and this unit does not."""
-    return [*differing(coordinates_of(variant)), *_not_read(variant)]
 
 
 def _not_read(variant: EstimateInput) -> list[str]:

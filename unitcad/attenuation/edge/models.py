@@ -67,10 +67,11 @@ def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable) -> Assessment:
     ratios = np.array([levels[i] / levels[c] for i, c in pairs])
     names = [f"{table.names[i]} to {table.names[c]}" for i, c in pairs]
     errors = np.abs(np.log(leave_one_out / table.levels))
+    sides = np.where(np.abs(ratios - 1.0) < 1e-9, 0.0, np.sign(ratios - 1.0))
     return Assessment(
         levels=_score(levels, table.levels, table.names),
         ratios=_score(ratios, measured, names),
-        directions=int(np.sum(np.sign(_log(ratios)) == np.sign(np.log(measured)))),
+        directions=int(np.sum(sides == np.sign(measured - 1.0))),
         leave_one_out=_score(leave_one_out, table.levels, table.names),
         leave_one_out_ratios=_score(np.array([without[i][i] / without[i][c] for i, c in pairs]), measured, names)
         if fitted_ratios
@@ -146,10 +147,6 @@ def choose_without(forms: Mapping[str, Fit], table: MeasuredTable) -> Choice:
     )
 
 
-def _log(ratios: np.ndarray) -> np.ndarray:
-    return np.where(np.abs(ratios - 1.0) < 1e-9, 0.0, np.log(ratios))
-
-
 def _score(predicted: np.ndarray, measured: np.ndarray, names: tuple[str, ...] | list[str]) -> Score:
     off = np.abs(np.log(predicted / measured))
     worst = int(np.argmax(off))
@@ -208,11 +205,11 @@ def log_linear(
 
 def one_constant(path: Predict) -> Model:
     """Return the model level = s path."""
-    return log_linear(("s",), _ones, lambda units: np.log(path(units)))
 
+    def ones(units: Units) -> Any:
+        return np.ones((*units.thickness.shape[:-1], 1))
 
-def _ones(units: Units) -> Any:
-    return np.ones((*units.thickness.shape[:-1], 1))
+    return log_linear(("s",), ones, lambda units: np.log(path(units)))
 
 
 def rule(ratio: float = 1.0, signed: bool = False) -> Model:

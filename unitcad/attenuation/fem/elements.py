@@ -177,9 +177,14 @@ def element_matrices(mesh: HarmonicMesh, harmonic: int) -> ElementMatrices:
         (scale * _product(strain, strain, weight) for scale, strain in zip((2, 2, 2, 1, 1, 1), strains, strict=False)),
         np.zeros(()),
     )
-    mass = sum((_product(u, u, weight) for u in _displacements(harmonic, n)), np.zeros(()))
+    o = np.zeros_like(n)
+    rows = [(n, o), (o, n)] if harmonic == 0 else [(n, n, o), (-n, n, o), (o, o, n)]  # u_r, (u_theta,) u_z
+    displacements = [np.concatenate(row, axis=-1) for row in rows]
+    mass = sum((_product(u, u, weight) for u in displacements), np.zeros(()))
     divergence = strains[0] + strains[1] + strains[2]
-    middle, half = _middle_and_half(mesh)
+    corners = basis.mesh.p[:, basis.mesh.t]
+    low, high = corners.min(axis=1)[..., None], corners.max(axis=1)[..., None]
+    middle, half = (low + high) / 2, (high - low) / 2
     linear = np.stack([np.ones_like(x[0]), *((x[i] - middle[i]) / half[i] for i in (0, 1))], axis=-1)
     gram = _product(linear, linear, weight)
     coupling = _product(linear, divergence, weight)
@@ -197,21 +202,8 @@ def _strains(harmonic: int, n: np.ndarray, dr: np.ndarray, dz: np.ndarray, r: np
     return [np.concatenate(row, axis=-1) for row in rows]
 
 
-def _displacements(harmonic: int, n: np.ndarray) -> list[np.ndarray]:
-    """Return u_r, (u_theta,) u_z, each (elements, points, unknowns of an element)."""
-    o = np.zeros_like(n)
-    rows = [(n, o), (o, n)] if harmonic == 0 else [(n, n, o), (-n, n, o), (o, o, n)]
-    return [np.concatenate(row, axis=-1) for row in rows]
-
-
 def _product(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.swapaxes(a * weight[..., None], 1, 2) @ b
-
-
-def _middle_and_half(mesh: HarmonicMesh) -> tuple[np.ndarray, np.ndarray]:
-    corners = mesh.basis.mesh.p[:, mesh.basis.mesh.t]
-    low, high = corners.min(axis=1)[..., None], corners.max(axis=1)[..., None]
-    return (low + high) / 2, (high - low) / 2
 
 
 Contact = Literal["bonded", "resting"]
