@@ -192,7 +192,12 @@ def sync(results: Iterable[Path]) -> None:
 
     Raises OSError.
     """
-    _sync(path for result in results for path in _own_files(result))
+    for path in (path for result in results for path in _own_files(result)):
+        handle = os.open(path, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:
@@ -203,15 +208,6 @@ def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:
                 yield from _own_files(entry.path)
             elif entry.is_file(follow_symlinks=False) and entry.stat(follow_symlinks=False).st_nlink == 1:
                 yield entry.path
-
-
-def _sync(paths: Iterable[str]) -> None:
-    for path in paths:
-        handle = os.open(path, os.O_RDWR)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def hold_folder(folder: Path) -> contextlib.AbstractContextManager[None]:

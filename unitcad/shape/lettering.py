@@ -39,7 +39,6 @@ _GLYPHS = {
     "F": "aefg",
     "L": "def",
 }
-CHARACTERS = frozenset(_GLYPHS)
 WIDTH, HEIGHT, PITCH = 3, 5, 4
 """Of a character, in strokes; PITCH from one to the next."""
 
@@ -47,7 +46,7 @@ WIDTH, HEIGHT, PITCH = 3, 5, 4
 def engraving(text: str, stroke: float, z0: float, z1: float) -> Shape:
     """`text` as a solid to cut with: lower left corner at the origin, reading along +x, from z0 to z1 (mm).
 
-    `text` is of `CHARACTERS` and has one or more. Raises KeyError for another character.
+    `text` has one or more hexadecimal digits in capitals, or L. Raises KeyError for another character.
     """
     return union(
         moved(Extrude(outer, z0, z1, holes), x=i * PITCH * stroke)
