@@ -361,8 +361,9 @@ def test_slopes(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
 
 def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:
     """Return the coefficients of equation 4 and inequalities 5 and 6: 5, 6a and 6b for each control; 6c and 6d once."""
+    read = {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus"}
     if unknown(variant):
-        return {"constraints": None}
+        return {**read, "constraints": None}
     units = corners(variant) if range_notes(variant) else nominal(variant)
     coefficients = {}
     for wave in _WAVES:
@@ -372,6 +373,8 @@ def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str,
             **_by_corner("k_r", cf.reflection(z[..., :-1], z[..., 1:]), variant),
         }
     return {
+        **read,
+        "poisson_ratio_used": [layer.poisson_ratio.middle for layer in variant.layers],
         "interfaces": [f"Layer {i + 1} to {i + 2}" for i in range(len(variant.layers) - 1)] + ["last layer to air"],
         "coefficients": coefficients,
         "constraints": [
