@@ -148,7 +148,7 @@ def test_the_command_writes_its_files_and_prints_the_null(tmp_path):
     assert "baseline" in done.stdout
     assert "rule leads" in done.stdout
     assert done.stdout.splitlines()[-1] == str(out)
-    assert sorted(file.name for file in out.iterdir()) == ["fit.json", "lab-fit.toml"]
+    assert sorted(file.name for file in out.iterdir()) == ["fit.json", "fit.svg", "lab-fit.toml"]
     shown = unitcad("fit", _written(tmp_path), "--json")
     assert json.loads(shown.stdout)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())
 

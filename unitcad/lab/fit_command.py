@@ -1,4 +1,4 @@
-"""unitcad fit: lab-fit.toml and fit.json. The same input, the same bytes."""
+"""unitcad fit: lab-fit.toml, fit.json and fit.svg. The same input, the same bytes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from rich.table import Column, Table
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE, sign_flip_p
-from unitcad.attenuation.edge.ranges import ModelFit, quantiles
+from unitcad.attenuation.edge.ranges import PERCENT, ModelFit, quantiles
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
+from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
 from unitcad.spec.convert import without_none
 from unitcad.spec.toml import text_of
@@ -34,6 +35,7 @@ def contents(result: Fitted) -> dict[str, str]:
     return {
         FIT: fit_toml(result),
         "fit.json": json.dumps(as_data(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        "fit.svg": _chart(result),
     }
 
 
@@ -184,6 +186,21 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
     ]
 
 
+def _chart(result: Fitted) -> str:
+    rows = unit_rows(result)
+    series = []
+    for label, own in (("the paper's units", False), ("the lab's own", True)):
+        there = [row for row in rows if row["own"] == own]
+        if there:
+            measured, predicted = ([row[key] for row in there] for key in ("measured", "predicted"))
+            bars = [(row["p10"], row["p90"]) for row in there]
+            series.append(Series(f"{label}, with {PERCENT[0]} to {PERCENT[1]} %", measured, predicted, True, bars=bars))
+    ends = [min(row["measured"] for row in rows), max(row["measured"] for row in rows)]
+    series.append(Series("predicted = measured", ends, ends, dashed=True))
+    title = f"{result.fit.name}: {result.fit.leads}, leave-one-out"
+    return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)
+
+
 def fit(
     lab: Annotated[
         str, typer.Argument(metavar="LAB", help="File of the units that a lab measured, or name of a shipped one.")
@@ -194,7 +211,7 @@ def fit(
             "-o",
             "--out",
             metavar="DIR",
-            help="Folder for lab-fit.toml and fit.json. Default: only print.",
+            help="Folder for lab-fit.toml, fit.json and fit.svg. Default: only print.",
         ),
     ] = None,
     as_json: AsJson = False,

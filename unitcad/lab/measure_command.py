@@ -128,7 +128,7 @@ def page(result: Measured) -> str:
         f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
         + (_table(place, levels) if levels else "<p>None: see the findings.</p>")
         + (f"<p>{escape(assumed)}.</p>" if assumed else "")
-        + f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        + f"{_figures(_decay_charts(result))}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
         "<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
         "comes from the scatter of the repeats.</p>"
         f"{_table(head, records)}<h2>Charts of the records</h2>{drawn}</body></html>\n"
@@ -154,6 +154,8 @@ STRETCHES = 100
 """Parts of a record of which its chart shows the least and the largest value."""
 BESIDE_HZ = 30.0
 """Width of a spectrum to either side of the line: one multiple of 50 Hz at least."""
+LEAST_WIDE_MM = 10.0
+"""Smallest span of the axis of distances."""
 
 
 def _record_charts(record: RecordResult) -> list[str]:
@@ -180,6 +182,19 @@ def _record_charts(record: RecordResult) -> list[str]:
         chart(whole, f"{record.file}: whole record", "time, s", unit),
         chart(series, f"{record.file}: spectrum", "frequency, Hz", amplitude, log_y=True, x_range=span),
     ]
+
+
+def _decay_charts(result: Measured) -> Iterator[str]:
+    """Chart each unit's levels of the first chain over the distance, as SVG."""
+    for unit in result.campaign.unit:
+        levels = [one for one in result.levels if (one.unit, one.chain) == (unit.name, result.campaign.chain.use[0])]
+        if levels:
+            x = [one.distance_mm for one in levels]
+            bars = [(one.level.low, one.level.high) for one in levels]
+            wide = max(LEAST_WIDE_MM, *x)
+            series = [Series("95 % interval", x, [one.level.value for one in levels], points=True, bars=bars)]
+            title = f"{unit.name}: level over the distance from the edge"
+            yield chart(series, title, "distance, mm", "level", log_y=True, x_range=(-0.03 * wide, 1.03 * wide))
 
 
 def _figures(charts: Iterable[str]) -> str:
