@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (451_600, 280, 57_200),
-    "core": (230_300, 150, 30_200),
-    "tests": (307_400, 0, 0),
+    "total": (433_900, 275, 54_600),
+    "core": (224_100, 150, 29_200),
+    "tests": (302_800, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900

@@ -5,6 +5,7 @@ import gzip
 import io
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from casting_rules import broken_rules
 from tests.arrays.made_arrays import pockets_cast
 from tests.report.test_glb import chunks
 from unitcad.arrays.array_file import array_hash, load_array
-from unitcad.arrays.array_page import patch_glb
+from unitcad.arrays.array_page import patch_glb, write_array_page
 from unitcad.arrays.arrayed import Arrayed
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore
@@ -97,6 +98,17 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up():
     assert drawn == {picture_path(name) for name in views(patch_moulds(array))}
     assert "tray" in {item.item for item in made.bill}
     assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
+
+
+def test_a_page_has_no_file_of_another_folder(folder, tmp_path):
+    """A manifest may come from others: a path in it leads nowhere else."""
+    copy = tmp_path / "out" / "array"
+    shutil.copytree(folder, copy)
+    (tmp_path / "out" / "secret.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><text>secret</text></svg>')
+    manifest = json.loads((copy / "manifest.json").read_text("utf-8"))
+    manifest["pictures"] = ["../secret.svg"]
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    assert "secret</text>" not in write_array_page(copy, print).read_text("utf-8")
 
 
 def test_the_bench_page_speaks_of_the_sheet(folder):
