@@ -195,9 +195,7 @@ def _relate(
                 own = by_shell[first[i] : first[i] + count[i]]
                 used, local = np.unique(own[:, :: -1 if volumes[i] < 0 else 1], return_inverse=True)
                 solids[i] = solid_of(vertices[used], local.reshape(-1, 3))  # without volume if manifold3d refuses it
-        shared = solids[a] ^ solids[b]
-        common = shared.volume()
-        thickness = 2 * common / max(shared.surface_area(), 1e-300)  # mean, mm
+        common, thickness = _shared(solids[a], solids[b])
         if volumes[a] * volumes[b] > 0 and common > _SHARE * least[at]:
             overlaps[(a, b)] = thickness if thickness < SPECK and common < least[at] / 2 else math.inf
         elif common > (1 - _SHARE) * least[at]:  # a cavity that touches the wall
@@ -216,3 +214,10 @@ def _where(topology: Topology, *shells: int) -> Location:
     which = list(shells)
     middle = (topology.low[which].max(axis=0) + topology.high[which].min(axis=0)) / 2
     return at_region(topology.kept[np.isin(topology.shells, which)], middle)
+
+
+def _shared(one: Manifold, other: Manifold) -> tuple[float, float]:
+    """Return the volume that two solids share, mm3, and its mean thickness, mm."""
+    common = one ^ other
+    volume = common.volume()
+    return volume, 2 * volume / max(common.surface_area(), 1e-300)
