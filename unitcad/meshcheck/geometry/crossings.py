@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -200,14 +201,19 @@ def _ahead(sieve: Callable[[Pairs], Pairs], blocks: Iterator[Pairs]) -> Iterator
     coming = deque[Future[Pairs]]()
     with ThreadPoolExecutor(1) as thread:
         for block in blocks:
-            try:
-                coming.append(thread.submit(sieve, block))
-            except RuntimeError:  # no room for the stack of a thread
-                raise MemoryError from None
+            coming.append(_submit(thread, sieve, block))
             if len(coming) > _AHEAD:
                 yield coming.popleft().result()
         while coming:
             yield coming.popleft().result()
+
+
+def _submit(thread: ThreadPoolExecutor, function: Callable[..., Any], *given: object) -> Future[Any]:
+    """Call a function in another thread. Raises MemoryError if there is no room for its stack."""
+    try:
+        return thread.submit(function, *given)
+    except RuntimeError:
+        raise MemoryError from None
 
 
 def _prepared(topology: Topology, order: Ints) -> Faces:
@@ -216,13 +222,15 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
     columns, corners = np.ascontiguousarray(vertices.T), columns_of(stored, order)
     normal = columns_of(topology.stored_areas, order)
     edges = topology.edges if stored is topology.mesh.faces else edges_of(stored, len(vertices))
-    smooth = height_fields(columns, corners, normal, surrounded_vertices(edges, len(vertices)))
     places = same_place(vertices).take(corners) if several and topology.mesh.indexed else corners
+    with ThreadPoolExecutor(1) as thread:
+        planes = _submit(thread, planes_of, columns, places, normal)
+        smooth = height_fields(columns, corners, normal, surrounded_vertices(edges, len(vertices)))
     return Faces(
         vertices,
         corners,
         np.where(smooth.take(corners), corners, np.int32(-1)),
-        planes_of(columns, places, normal),
+        planes.result(),
         topology.shells[order],
         topology.kept[order],
         several,
