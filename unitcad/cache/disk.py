@@ -38,10 +38,10 @@ _CLAIMS, _CLAIM_S = 40, 0.05
 class DiskStore:
     """A store in a folder.
 
-    Entries are written under a temporary name and renamed. Each process verifies the checksum of content and entries on
-    first use and watches size and time of change afterwards; whatever does not match is removed and made again. An
-    entry that can't be written (no space, read-only) is no error: the content is held in memory for this process
-    instead.
+    Entries are written under a temporary name and renamed. Each process verifies the checksum of an entry whenever it
+    reads it, that of content on first use, and watches the content's size and time of change afterwards; whatever does
+    not match is removed and made again. An entry that can't be written (no space, read-only) is no error: the content
+    is held in memory for this process instead.
     """
 
     def __init__(self, root: Path) -> None:

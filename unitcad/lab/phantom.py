@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from itertools import pairwise
 from typing import Annotated, Any
@@ -68,13 +69,16 @@ def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
     return load_file(source, "phantom", lambda data, _: convert(data, PhantomTable))
 
 
-_TABLE = tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
-SOURCE = str(_TABLE["source"])
-"""Source of the moduli of silicones with thinner."""
 THINNER_DENSITY = 0.97
 """g/cm3 (assumed: a silicone oil)."""
 LOSS_FACTOR = (0.2, 0.1, 0.3)
 """Tan delta of a silicone with thinner, and its range (assumed)."""
+
+
+@cache
+def thinned() -> dict[str, Any]:
+    """Return the moduli of silicones with thinner by silicone, and their `source`."""
+    return tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[flo
     Between two tested shares the logarithm of the modulus is interpolated. Raises Refusal for a silicone that was not
     tested, and for a share outside the tested ones.
     """
-    known = {name: table for name, table in _TABLE.items() if isinstance(table, dict)}
+    known = {name: table for name, table in thinned().items() if isinstance(table, dict)}
     if silicone not in known:
         raise unknown_name(f"{field}.silicone", silicone, known)
     shares, moduli, deviations = (
@@ -418,7 +422,7 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
     for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
         found[layer.name] = {
             "status": "secondary",
-            "source": f"{one.silicone.name} + {layer.thinner_pct:g} % thinner, {SOURCE}{also}",
+            "source": f"{one.silicone.name} + {layer.thinner_pct:g} % thinner, {thinned()['source']}{also}",
             "thickness_mm": layer.thickness_mm,
             "density_kg_m3": rounded(1e3 * one.density_g_cm3, 4),
             "youngs_modulus_kpa": ranged(one.modulus_kpa, one.low_kpa, one.high_kpa),

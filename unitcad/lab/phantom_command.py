@@ -24,7 +24,6 @@ from unitcad.lab.phantom import (
     LOSS_FACTOR,
     PLATE_PLAY,
     SEGMENTS,
-    SOURCE,
     THINNER_MM,
     PhantomLayer,
     PhantomSet,
@@ -33,6 +32,7 @@ from unitcad.lab.phantom import (
     phantom_set,
     printed_pieces,
     stiffening,
+    thinned,
     tissue_table,
 )
 from unitcad.meshcheck import Options, check_file
@@ -173,7 +173,7 @@ def _plate(phantom: PhantomSet) -> str:
 def _moduli(phantom: PhantomSet) -> Iterator[str]:
     """Return the source of the moduli, the table of thinned silicones, and the effect of the frequency."""
     hertz = phantom.table.frequency_hz
-    yield f"Moduli: {SOURCE}. They are quasi-static."
+    yield f"Moduli: {thinned()['source']}. They are quasi-static."
     yield "The range is two standard deviations of that table."
     yield (
         f"The upper end of a range has a factor of {stiffening(hertz):.3g} for {hertz:g} Hz, by the catalogue's "

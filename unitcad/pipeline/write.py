@@ -192,12 +192,13 @@ def sync(results: Iterable[Path]) -> None:
 
     Raises OSError.
     """
-    for path in (path for result in results for path in _own_files(result)):
-        handle = os.open(path, os.O_RDWR)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    for result in results:
+        for path in _own_files(result):
+            handle = os.open(path, os.O_RDWR)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
 
 
 def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:

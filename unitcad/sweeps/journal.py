@@ -99,7 +99,7 @@ class Journal:
         self.out = out
         self.head = {**to_builtins(head), "code": code_version()}
         self._seed = zlib.crc32(_text(self.head))
-        self._starts: dict[int, int] = {}  # of the last line of each variant, in the order of their first ones
+        self._starts: dict[int, int] = {}  # of each variant's last line
         self.damaged = 0
         self._lock = _lock(out, head)
         try:
