@@ -1,5 +1,6 @@
 """The pre-commit hook and the GitHub Action, as data and by running what they run."""
 
+import importlib.metadata
 import json
 import os
 import re
@@ -194,6 +195,76 @@ def test_the_settings_on_the_page_are_settings(tmp_path, monkeypatch):
         )
         (tmp_path / "part.stl").write_bytes(stl(box()))
         assert run("part.stl", cwd=tmp_path).returncode == 0
+
+
+PIP_PROJECT = """
+[build-system]
+requires = []
+build-backend = "backend"
+backend-path = ["."]
+[project]
+name = "unitcad"
+version = "0"
+"""
+BACKEND = """
+import zipfile
+def build_wheel(folder, config_settings=None, metadata_directory=None):
+    with zipfile.ZipFile(f"{folder}/unitcad-0-py3-none-any.whl", "w") as wheel:
+        wheel.writestr("unitcad-0.dist-info/METADATA", "Metadata-Version: 2.1\\nName: unitcad\\nVersion: 0\\n")
+        wheel.writestr("unitcad-0.dist-info/WHEEL", "Wheel-Version: 1.0\\nRoot-Is-Purelib: true\\nTag: py3-none-any\\n")
+        wheel.writestr("unitcad-0.dist-info/RECORD", "")
+    return "unitcad-0-py3-none-any.whl"
+"""
+
+
+@pytest.fixture(scope="module")
+def fresh_python(tmp_path_factory):
+    """A Python with pip, as `setup-python` gives."""
+    folder = tmp_path_factory.mktemp("python")
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True, capture_output=True)
+    return folder / "bin"
+
+
+@needs_bash
+@pytest.mark.parametrize("search", [None, ".", "src", ":src"])
+@pytest.mark.parametrize("step", ["Install", "Check"])
+def test_the_action_runs_no_code_of_the_checkout(step, search, fresh_python, tmp_path):
+    """Modules with the name of everything that Python, pip or unitcad may import, and a workflow's own PYTHONPATH."""
+    checkout, ran, project = (tmp_path / name for name in ("checkout", "ran", "project"))
+    installed = {name for name in importlib.metadata.packages_distributions() if name.isidentifier()}
+    names = {*sys.stdlib_module_names, *installed, "sitecustomize", "usercustomize"}
+    for folder in (checkout, checkout / "src"):
+        for name in ("pip", "unitcad"):
+            (folder / name).mkdir(parents=True)
+        for name in names:
+            whole = folder / name if (folder / name).is_dir() else None
+            for file in [whole / "__init__.py", whole / "__main__.py"] if whole else [folder / f"{name}.py"]:
+                file.write_text(f"open({str(ran / name)!r}, 'w').close()\n")
+    for name, text in {"pyproject.toml": PIP_PROJECT, "backend.py": BACKEND}.items():
+        project.mkdir(exist_ok=True)
+        (project / name).write_text(text)
+    ran.mkdir()
+    (checkout / "a.stl").write_bytes(stl(box()))
+    inputs = {"STEP": "false", "SOURCE": str(project), "PIP_TARGET": str(tmp_path / "installed"), "PIP_NO_INDEX": "1"}
+    inputs |= {"FILES": "a.stl\nno such name.stl", "FAIL_ON": "", "PRINTER": "", "SARIF": "", "SUMMARY": "true"}
+    inputs |= {"ARGUMENTS": "--jobs 2 --output-format 'text'", "GITHUB_STEP_SUMMARY": str(tmp_path / "summary.md")}
+    programs = fresh_python if step == "Install" else Path(sys.executable).parent
+    environment = {**os.environ, **inputs, "PATH": f"{programs}:{os.environ['PATH']}"}
+    if search is not None:
+        environment |= {"PYTHONPATH": search, "PYTHONWARNINGS": "ignore::colorsys.Planted"}
+    script = tmp_path / "step.sh"
+    script.write_text(_scripts()[step == "Check"])
+    done = subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", str(script)],
+        cwd=checkout, env=environment, capture_output=True, text=True,
+    )  # fmt: skip
+    assert [path.name for path in ran.iterdir()] == []
+    if step == "Install":
+        assert done.returncode == 0, done.stderr
+        assert (tmp_path / "installed/unitcad-0.dist-info").is_dir()
+    else:
+        assert done.returncode == 2, done.stderr
+        assert "4 files: 3 failed, 1 passed." in (tmp_path / "summary.md").read_text("utf-8")
 
 
 def test_the_actions_inputs_are_not_pasted_into_its_script():
