@@ -34,7 +34,41 @@ def _value(text, key):
 def test_hook_takes_mesh_files_by_suffix(name, wanted):
     hook = (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")
     assert bool(re.search(_value(hook, "files"), name)) == wanted
-    assert _value(hook, "entry") == "unitcad check"
+    assert _value(hook, "entry") == "unitcad check --hook"
+
+
+NAMES = [
+    "--report=json=out/x.stl", "--report=sarif=/{outside}/x.stl", "--pictures=p/x.stl", "--config=x.stl",
+    "--ignore=T/x.obj", "--help.stl", "-j9/--.stl",
+    "--fail-on/error.stl", "--hook.stl", "-.stl", "*.stl", "-x -y.stl", "--/x.stl",
+]  # fmt: skip
+
+
+@needs_bash
+@pytest.mark.parametrize("own", [
+    [], ["--output-format", "json"], ["--output-format=json", "--config", "own.toml", "-j", "2"], ["--json", "--"],
+])  # fmt: skip
+def test_a_file_name_is_no_option_of_the_hook(own, tmp_path):
+    """As pre-commit calls it: the entry, the user's own arguments, then names, by xargs."""
+    folder, outside = tmp_path / "work", str(tmp_path / "outside").strip("/")
+    names = [name.replace("{outside}", outside) for name in NAMES]
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(stl(box(), header=b"solid") if name.endswith("stl") else b"v 0 0 0\n")
+    (folder / "own.toml").write_text("[check]\nfail-on = 'error'\n")
+    before = sorted(tmp_path.rglob("*"))
+    entry = _value((ROOT / ".pre-commit-hooks.yaml").read_text("utf-8"), "entry").split()
+    program = Path(sys.executable).parent / entry[0]
+    done = subprocess.run(
+        ["xargs", "-0", str(program), *entry[1:], *own],
+        input="\0".join(names), cwd=folder, capture_output=True, text=True,
+    )  # fmt: skip
+    assert sorted(tmp_path.rglob("*")) == before
+    if own:
+        assert {file["path"] for file in json.loads(done.stdout)["files"]} == set(names)
+    else:
+        assert f"{len(names)} files: " in done.stdout, done.stderr
+    assert done.returncode == 123  # of xargs; the OBJ has no faces
 
 
 def _scripts():

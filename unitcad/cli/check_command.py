@@ -215,6 +215,10 @@ def check(
         str | None,
         typer.Option(metavar="FILE", help="Settings: a TOML file with a [check] table. Default: the nearest one."),
     ] = None,
+    hook: Annotated[
+        bool,
+        typer.Option("--hook", help="Take words from a hook runner: options, then existing files of any name."),
+    ] = False,
     explain: Annotated[
         list[str] | None,
         typer.Option(metavar="CODES", help="Explain mesh rules and mould checks (C...). No file is checked."),
