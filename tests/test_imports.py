@@ -154,22 +154,28 @@ def test_the_rooms_of_check_import_one_way():
             assert room == "__init__" or level[room] < level[other], f"{file} imports {other}"
 
 
-def _names_of_designs(text):
-    """The words of a file's code, texts and comments that are a shipped design's name, but for docstrings' examples."""
-    text = re.sub(r'Examples\n +-+\n.*?"""', lambda match: "\n" * match[0].count("\n"), text, flags=re.DOTALL)
-    word = re.compile(rf"(?<![a-z])({'|'.join(shipped())})(?![a-z])", re.IGNORECASE)
-    return [f"{line}: {named[0]}" for line, row in enumerate(text.splitlines(), 1) for named in word.finditer(row)]
+def _decisions_by_design(file):
+    """The places where a file compares something with the name of a shipped design, or keeps a table of such names."""
+    found = []
+    for node in ast.walk(_tree(file)):
+        if isinstance(node, ast.Compare):
+            asked = [node.left, *node.comparators]
+        elif isinstance(node, ast.Dict):
+            asked = [key for key in node.keys if key]
+        elif isinstance(node, ast.MatchValue):
+            asked = [node.value]
+        else:
+            continue
+        words = [part.value for one in asked for part in ast.walk(one) if isinstance(part, ast.Constant)]
+        found += [f"{file.name}:{node.lineno}: {word}" for word in words if word in shipped()]
+    return found
 
 
-def test_no_design_is_named_outside_its_own_file():
+def test_no_code_decides_by_the_name_of_a_design():
+    """A file that needs to know reads the design's `Design`; words and comments may use any name."""
     own = {Path(sys.modules[design.layers.__module__].__file__ or "") for design in shipped().values()}
     assert len(own) == len(shipped()) > 0
-    named = {file.name: found for file in PACKAGE.rglob("*.py") if (found := _names_of_designs(file.read_text()))}
-    assert named.keys() >= {file.name for file in own}
-    others = {name: found for name, found in named.items() if name not in {file.name for file in own}}
-    assert others == {}, (
-        "a design's name is a word of its own: rename the design, or have the other file read its Design"
-    )
+    assert [found for file in sorted({*PACKAGE.rglob("*.py")} - own) for found in _decisions_by_design(file)] == []
 
 
 def test_every_design_has_a_template_and_one_is_the_default():

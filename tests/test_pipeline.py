@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-import traceback
 from pathlib import Path
 
 import manifold3d
@@ -14,14 +13,9 @@ import numpy as np
 import pytest
 import trimesh
 
-import unitcad
 from tests.in_process import unitcad as run
 from tests.sample_bodies import LEADLESS
-from unitcad import cli
 from unitcad.errors import UnitcadError
-from unitcad.kernels import mesh
-from unitcad.moulds import mould_set
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import make as artifacts
 from unitcad.pipeline.write import build, replacing, subject
 from unitcad.validation import load, templates
@@ -32,7 +26,6 @@ def folder_name(spec):
 
 
 NAMES = sorted(templates())
-PACKAGE = str(Path(unitcad.__file__).parent)
 
 
 def _tree(folder):
@@ -212,20 +205,3 @@ def test_variants_that_differ_in_casting_alone_share_one_estimate(monkeypatch, t
     artifacts._ESTIMATES.clear()
     again = build(load("single-embedded", changes[1]), tmp_path / "again", only=("estimate",))
     assert (again.folder / "estimate.json").read_bytes() == files[1]
-
-
-def test_few_files_and_frames_lie_between_the_command_and_the_mesh_of_a_cup(monkeypatch, tmp_path):
-    cup, paths, realise = MouldSet(load("encapsulating")).plan.tool("cup1").shape, [], mesh.realise
-
-    def spy(shape, segments):
-        if shape == cup:
-            paths.append([frame for frame in traceback.extract_stack() if frame.filename.startswith(PACKAGE)])
-        return realise(shape, segments)
-
-    monkeypatch.setattr(mould_set, "realise", spy)
-    monkeypatch.setattr(sys, "argv", ["unitcad", "build", "encapsulating", "--formats", "stl", "-o", str(tmp_path)])
-    with pytest.raises(SystemExit) as left:
-        cli.main()
-    assert left.value.code == 0
-    assert len(paths[0]) <= 12
-    assert len({frame.filename for frame in paths[0]}) <= 8

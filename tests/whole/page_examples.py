@@ -15,6 +15,8 @@ ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 FILE = "# file: "
+ALL_OF_THEM = re.compile(r"\b(\d+) of \1\b")
+"""A page need not change if somebody adds a check that passes."""
 
 
 def pages(root=ROOT):
@@ -30,8 +32,9 @@ def blocks(page, language):
 def missing(shown, output):
     """Return the first line of `shown` that `output` lacks at its place, or a line that is not shown.
 
-    The line "..." stands for any lines, "..." within a line for any words.
+    The line "..." stands for any lines, "..." within a line for any words. "61 of 61" fits any other number of all.
     """
+    shown, output = ([ALL_OF_THEM.sub("all of them", line) for line in lines] for lines in (shown, output))
     at, anywhere = 0, False
     for line in shown:
         if line == "...":
