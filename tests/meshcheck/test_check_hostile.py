@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shapes import ROOT_RELS, TYPES, box, model_xml, package, stl
+from shapes import ROOT_RELS, TYPES, box, mesh_xml, model_xml, package, stl
 
 from unitcad.meshcheck import Options, check_file, check_mesh
 from unitcad.meshcheck.file_checks import check_files, check_guarded
@@ -63,6 +63,22 @@ def test_a_bomb_is_refused_before_it_is_inflated(tmp_path):
 )
 def test_a_packages_bounds(content, bounds, judge):
     assert judge(content, "a.3mf", **bounds).has("F011")
+
+
+@pytest.mark.parametrize("flood", ['<vertex x="0" y="0" z="0" odd="1"/>', '<vertex x="0" y="0" z="0" xml:lang="1"/>'])
+@pytest.mark.parametrize(("fault", "code"), [
+    ('<triangle v1="0" v2="1" v3="400"/>', "P011"),
+    ('<triangle v1="0" v2="1" v3="2147483647"/>', "P011"),
+    ('<triangle v1="0" v2="1"/>', "P017"),
+    ('</triangles></mesh></object><object id="2"><mesh><vertices><vertex x="nan" y="0" z="0"/></vertices><triangles>',
+     "V001"),
+])  # fmt: skip
+def test_a_flood_of_findings_hides_no_other(flood, fault, code, judge):
+    mesh = mesh_xml().replace("<vertices>", "<vertices>" + flood * 300).replace("</triangles>", fault + "</triangles>")
+    report = judge(package(model_xml(f'<object id="1">{mesh}</object>')), "a.3mf")
+    assert not report.has("F011")
+    (found,) = (finding for finding in report.findings if finding.code == code)
+    assert found.severity == "error"
 
 
 def test_a_wrong_size_in_the_directory_is_no_way_round(judge):

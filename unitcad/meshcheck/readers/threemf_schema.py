@@ -152,7 +152,7 @@ ELEMENTS: dict[str, dict[str, ElementSchema]] = {
 
 
 LINE = 7  # column of a triangle's line
-_NOTED = 200  # findings kept of one part
+_NOTED = 200  # findings of one rule and severity kept of one part: a flood of one does not hide another
 
 
 @dataclass
@@ -210,10 +210,13 @@ class Model:
     has_build: bool = False
     strict: bool = False
     where: Callable[[], Location] = Location
+    _noted: dict[tuple[str, str | None], int] = field(default_factory=dict)
 
     def add(self, rule: Rule, message: str, severity: str | None = None, line: int | None = None) -> None:
         """Add a finding about this part, placed by `where`, or at `line`."""
-        if len(self.findings) < _NOTED:
+        kind = rule.code, severity
+        if self._noted.get(kind, 0) < _NOTED:
+            self._noted[kind] = self._noted.get(kind, 0) + 1
             place = replace(self.where(), part=self.part)
             place = place if line is None else replace(place, line=line)
             self.findings.append(rule.finding(message, 1, [place], severity))
