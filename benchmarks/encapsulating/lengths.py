@@ -50,7 +50,7 @@ def lengths() -> dict:
         "corner": CORNER_RADIUS,
         "mark": MARK,
         "recess": moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG)),
-        "ribs": _ribs(spec, lay),
+        "ribs": _ribs(variant.frame),
         "skirt_end": -moulds.plinth_height_mm + moulds.seat_relief_mm,
         "cup": lay.cup[0],
         "plate": lay.plate[0],
@@ -87,14 +87,14 @@ def lengths() -> dict:
     }
 
 
-def _ribs(spec: Any, lay: Any) -> list[list[list[list[float]]]]:
+def _ribs(frame: Any) -> list[list[list[list[float]]]]:
     """The corners (x, y, z) of the four sections of each rib, from the skirt's end upwards."""
-    moulds, draft = spec.moulds, math.radians(PLINTH_DRAFT_DEG)
-    line = float(printer_of(spec).least_feature_mm)
+    moulds, draft = frame.spec.moulds, math.radians(PLINTH_DRAFT_DEG)
+    line = float(printer_of(frame.spec).least_feature_mm)
     into, wall = moulds.rib_interference_mm / math.cos(draft), moulds.plinth_clearance_mm / math.cos(draft)
     foot = line / 2 + into + wall + ROOT
     drawn = []
-    for rib in ribs(spec, lay):
+    for rib in ribs(frame):
         (nx, ny), sections = rib.inwards, []
         for z, tip in ((rib.foot, -wall - ROOT / 2), (rib.bottom, into), (rib.top, into), (rib.head, -wall - ROOT / 2)):
             face = z * math.tan(draft)

@@ -83,7 +83,7 @@ def moulds_of(folder, code, *overrides, layers=1):
 
 def test_cup_base_layers_and_seals_fill_the_block(tmp_path):
     moulds = moulds_of(tmp_path, lugs(), layers=2)
-    spec, lay, drawn = moulds.spec, moulds.plan.layout, complement(moulds.spec, cast_layers(moulds.spec))
+    spec, drawn = moulds.spec, complement(moulds.spec, cast_layers(moulds.spec))
     depths = {1: 0.0, 2: spec.moulds.groove_depth_mm}  # the supports' holes leave cup 1 no room for a groove
     inner = drawn.dimensions.radii[1] + spec.moulds.land_mm
     ring_area = math.pi * ((inner + spec.moulds.groove_width_mm) ** 2 - inner**2)
@@ -96,7 +96,7 @@ def test_cup_base_layers_and_seals_fill_the_block(tmp_path):
         tools = [tool.shape for tool in drawn.tools if tool.name in ("base", step.cup)]
         filled = union((*tools, *drawn.seals[step.index - 1]))  # a seal reaches into the plinth
         parts = [filled, *step.layer, *step.earlier]
-        block = volume(cup_blank(spec, lay, step.rim)) - depths[step.index] * ring_area
+        block = volume(cup_blank(moulds.frame, step.rim)) - depths[step.index] * ring_area
         assert sum(map(volume, parts)) == pytest.approx(block, rel=1e-4)
         assert volume(drawn.seals[step.index - 1][0]) > 1
     assert len(moulds.solids["base"].trim_by_plane((0, 0, 1), 0.01).decompose()) == 3  # a core and two supports

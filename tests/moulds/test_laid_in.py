@@ -60,8 +60,7 @@ def test_the_cup_has_a_slot_over_the_tail_and_the_base_carries_it():
 def _whole(moulds):
     from unitcad.moulds.cup import cup
 
-    spec, dims = moulds.spec, replace(moulds.plan.dimensions, exit=None)
-    return cup(spec, dims, moulds.plan.layout, 1)
+    return cup(replace(moulds.frame, dims=replace(moulds.plan.dimensions, exit=None)), 1)
 
 
 def test_it_is_laid_in_between_the_pours(tmp_path):

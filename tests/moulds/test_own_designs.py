@@ -76,7 +76,7 @@ from unitcad.designs.dimensions import concentric
 from unitcad.moulds.base import stand
 from unitcad.moulds.pieces import blade
 from unitcad.moulds.cup import cup_blank, groove, recess
-from unitcad.moulds.layout import layout
+from unitcad.moulds.layout import Frame
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece
 from unitcad.shape import cut, cylinder, moved, ring
 
@@ -88,12 +88,13 @@ def dimensions(spec):
 
 def tooling(spec, cast):
     dims = dimensions(spec)
-    lay, rim = layout(spec, dims), dims.heights[0]
+    frame, rim = Frame.of(spec, dims), dims.heights[0]
+    lay = frame.lay
     core = cut(cylinder(dims.cavity_radius, -1, rim), [cylinder(1, RELIEF, rim + 1)])
-    base = stand(spec, lay, [moved(core, cell.x, cell.y) for cell in lay.cells])
+    base = stand(frame, [moved(core, cell.x, cell.y) for cell in lay.cells])
     bores = [moved(cylinder(dims.outer_radius, -1, rim + 1), cell.x, cell.y) for cell in lay.cells]
-    grooves = [groove(spec, dims, 0, cell) for cell in lay.cells]
-    cup = cut(cup_blank(spec, lay, rim), [recess(spec, lay), *bores, *grooves])
+    grooves = [groove(frame, 0, cell) for cell in lay.cells]
+    cup = cut(cup_blank(frame, rim), [recess(frame), *bores, *grooves])
     return Tooling(dims, lay, (base_piece(base), cup_piece(1, cup), blade_piece(blade(lay, rim))), seals=((),))
 
 DESIGN = Design(name="sleeve", about="a ring", layers=layers, dimensions=dimensions, tooling=tooling)

@@ -34,8 +34,8 @@ SETS = [
 def test_ribs_stay_clear_of_cavity_windows_tongues_and_pry_slots(source):
     """Measured between meshes: half a millimetre to whatever else the cup touches or lets through."""
     moulds = set_of(*source)
-    (standing,) = [moulds.meshes(rib_shapes(moulds.spec, moulds.plan.layout))]
-    assert len(ribs(moulds.spec, moulds.plan.layout)) == 8
+    (standing,) = [moulds.meshes(rib_shapes(moulds.frame))]
+    assert len(ribs(moulds.frame)) == 8
     for step in moulds.plan.steps:
         others = moulds.meshes((*step.layer, *step.earlier, *step.seals))
         others += [moulds.solids[tongue.name] for tongue in moulds.plan.standing(step, "tongue")]
@@ -49,7 +49,7 @@ def test_the_crushed_volume_is_that_of_the_crests(source):
     """What base and cup share, by the trapezium of a crest: its height x depth x (line + depth), and its two ramps."""
     moulds = set_of(*source)
     line, depth = float(printers()[moulds.spec.moulds.printer].least_feature_mm), moulds.spec.moulds.rib_interference_mm
-    (first, *_) = standing = ribs(moulds.spec, moulds.plan.layout)
+    (first, *_) = standing = ribs(moulds.frame)
     least = len(standing) * (first.top - first.bottom) * depth * (line + depth)
     ramps = len(standing) * (first.head - first.foot - first.top + first.bottom) * depth * (line + depth)
     for step in moulds.plan.steps:
@@ -61,7 +61,7 @@ def test_the_crushed_volume_is_that_of_the_crests(source):
 def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press():
     """The cup is let go at its place and moved by each rib's force until nothing moves it: no algebra in common."""
     moulds = set_of("embedded", "moulds.cavities=[2,2]")
-    standing, depth = ribs(moulds.spec, moulds.plan.layout), 0.1
+    standing, depth = ribs(moulds.frame), 0.1
     rng, worst = np.random.default_rng(3), 0.0
     for strengths in rng.choice((1 - UNEVEN, 1 + UNEVEN), (15, len(standing))):
         x = y = turn = 0.0
@@ -101,7 +101,7 @@ def test_no_ribs_where_none_are_asked_for():
     for printer in ("sla", "fdm-0.4"):
         moulds = set_of("encapsulating", "moulds.rib_interference_mm=0", f"moulds.printer={printer}")
         assert moulds.spec.moulds.plinth_height_mm == 2.0
-        assert rib_shapes(moulds.spec, moulds.plan.layout) == []
+        assert rib_shapes(moulds.frame) == []
         assert broken(moulds) == set()
         assert all("play" in f.where for f in check_moulds(moulds) if f.code == "C220")
         assert eccentricity(moulds).ribs == 0
@@ -117,7 +117,7 @@ def test_a_rib_wider_into_the_plinth_than_half_a_line_is_refused():
 def test_a_resin_cup_s_leaves_bend_within_the_limit_and_into_their_slots():
     """By the beam's closed formula: 1.5 x 0.5 x 0.13 / 3.06^2, the arm from the crest's measured top to the seat."""
     moulds = set_of("encapsulating", "moulds.printer=sla")
-    rib = ribs(moulds.spec, moulds.plan.layout)[0]
+    rib = ribs(moulds.frame)[0]
     found = {f.where: f for f in check_moulds(moulds) if f.code == "C220" and "leaf" in f.where}
     assert len(found) == 4
     for cup in ("cup1", "cup2"):
@@ -135,7 +135,7 @@ def _leaf_broken(change):
 def test_faults_of_a_leaf_are_found():
     """A slot that ends low, one that a flaw fills, a leaf twice as thick, and one that is not freed at one side."""
     moulds = set_of("encapsulating", "moulds.printer=sla")
-    slots, rib = slot_shapes(moulds.spec, moulds.plan.layout)[0], ribs(moulds.spec, moulds.plan.layout)[0]
+    slots, rib = slot_shapes(moulds.frame)[0], ribs(moulds.frame)[0]
     strain, room = "cup1: strain at the root of a rib's leaf", "cup1: room behind a rib's leaf"
     x, y = rib.x, rib.y
     recess = draw_taper(moulds.plan.layout, moulds.spec.moulds.plinth_clearance_mm, skirt_end(moulds.spec))

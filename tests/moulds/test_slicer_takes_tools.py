@@ -71,7 +71,7 @@ def test_a_broken_mesh_needs_one(tmp_path):
 def test_the_slicer_draws_a_cup_s_ribs(name, tmp_path):
     """The outer edge of the extruded lines, halfway up the crests, reaches into the plinth by the interference."""
     moulds = set_of("encapsulating", f"moulds.printer={name}")
-    layer, (rib, *_) = moulds.spec.moulds.layer_mm, ribs(moulds.spec, moulds.plan.layout)
+    layer, (rib, *_) = moulds.spec.moulds.layer_mm, ribs(moulds.frame)
     cup = moulds.plan.tool("cup1")
     file, code = tmp_path / "cup.stl", tmp_path / "cup.gcode"
     file.write_bytes(printing.stl(*print_ready(*arrays(moulds.solids["cup1"]), cup.upside_down), "cup"))

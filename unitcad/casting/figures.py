@@ -298,7 +298,7 @@ def eccentricity(moulds: MouldSet) -> Eccentricity:
     """Return the eccentricity of a set's cups, on ribs or without."""
     lengths = moulds.spec.moulds
     clearance, off, depth = lengths.plinth_clearance_mm, lengths.xy_play_mm, lengths.rib_interference_mm
-    standing = ribs(moulds.spec, moulds.plan.layout)
+    standing = ribs(moulds.frame)
     if not standing:
         return Eccentricity(0, math.sqrt(2) * clearance, math.sqrt(2) * (clearance + off))
     # A gap can't be narrower than nothing; one wider than the ribs reach leaves the rest as play. Of opposite ribs one

@@ -48,7 +48,7 @@ LEVEL_AGAIN = "Correct the level with paper."
 def pour_steps(batch: Batch) -> Iterator[BenchStep]:
     """Describe one pour, from an empty mould to a cured layer on the core."""
     moulds, step, n = batch.moulds, batch.step, batch.step.index
-    plan, spec, tongues = moulds.plan, moulds.spec, moulds.plan.standing(step, "tongue")
+    plan, tongues = moulds.plan, moulds.plan.standing(step, "tongue")
     cells, the_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
     # Each cavity has a groove, which stops next to a window.
     groove = "the groove" if len(step.layer) == 1 else "the grooves"
@@ -102,7 +102,7 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
     elif bare:
         agent = f"Release agent, if any, thinly and only on the bore of cup {n}, away from the {holds(moulds)}."
     # Ribs centre the cup, or a push as for the cup before.
-    if ribs(spec, plan.layout):
+    if ribs(moulds.frame):
         on = "on and press it down evenly until it sits; its ribs centre it."
     elif plan.pins:
         on = (

@@ -197,7 +197,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     yield from joining(moulds)
     required_tools = ("paper",)
     fits = "Put each cup on the plinth once, dry; its cut corner lets it on one way only."
-    standing, leaf = ribs(spec, plan.layout), leaf_mm(printer_of(spec))
+    standing, leaf = ribs(moulds.frame), leaf_mm(printer_of(spec))
     if plan.pins:
         fits = (
             "Put each cup over the pins once, dry; one pin stands off the square of the others, so it goes on one way "

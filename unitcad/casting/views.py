@@ -328,7 +328,7 @@ def _skin_on(moulds: MouldSet) -> Views:
     """Yield the view of the unit above the film that closes its skin side."""
     if trays := moulds.plan.of_kind("tray"):
         rim, colour = moulds.dimensions.heights[-1], layer_colour(len(moulds.plan.steps) - 1)
-        film = Extra(union(films(moulds.dimensions, moulds.plan.layout)), colour)
+        film = Extra(union(films(moulds.frame)), colour)
         names = (Name("film", (moulds.plan.layout.cells[0].x, moulds.plan.layout.cells[0].y, rim), on=True),)
         yield (
             "skin-on",

@@ -34,9 +34,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         solid, dims = moulds.mesh(tray), moulds.plan.dimensions
         rim, reach = dims.heights[-1], dims.outer_radius + moulds.spec.moulds.land_mm / 2
         floor = extent(tray.shape)[2]
-        for i, (cell, drawn) in enumerate(
-            zip(moulds.plan.layout.cells, films(dims, moulds.plan.layout), strict=True), 1
-        ):
+        for i, (cell, drawn) in enumerate(zip(moulds.plan.layout.cells, films(moulds.frame), strict=True), 1):
             film = moulds.mesh_of(drawn)
             column = realise(moved(cylinder(reach, floor, rim), cell.x, cell.y), moulds.segments)
             hollow = column - solid

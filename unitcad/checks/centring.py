@@ -36,7 +36,7 @@ FARTHEST, NEAR = 4.0, 1e-4
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure how each cup is centred."""
     lengths = moulds.spec.moulds
-    standing = ribs(moulds.spec, moulds.plan.layout)
+    standing = ribs(moulds.frame)
     for step in moulds.plan.steps:
         where = step.lid if step.pins and step.lid else step.cup
         if where not in moulds.solids:
@@ -70,7 +70,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
 
 def _bending(moulds: MouldSet, cup: str, depth: float, contact: float) -> Iterator[MouldFinding]:
     """Measure how far a cup's leaves are strained, and whether they find room, if ribs bear up to z = `contact`."""
-    lengths, standing = moulds.spec.moulds, ribs(moulds.spec, moulds.plan.layout)
+    lengths, standing = moulds.spec.moulds, ribs(moulds.frame)
     leaf = thickest_leaf(moulds.solids[cup], standing, lengths.plinth_clearance_mm)
     pushed, arm = farthest_push(depth, lengths.xy_play_mm, lengths.plinth_clearance_mm), leaf.root - contact
     strain = leaf_strain(leaf.thickness, pushed, arm) if arm > 0 else math.inf

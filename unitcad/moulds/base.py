@@ -22,37 +22,38 @@ from unitcad.designs import Dimensions, design_of
 from unitcad.designs.design import BEYOND, Layout, solid_within, strip
 from unitcad.designs.dimensions import Exit
 from unitcad.moulds import filament
-from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG
+from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, Frame
 from unitcad.shape import Extrude, Profile, Shape, box, cut, moved, rounded_rectangle, turned, union
 from unitcad.spec import Spec
 
 GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5
 
 
-def tongue(dims: Dimensions, lay: Layout, exit: Exit, cut: bool = False) -> Shape:
+def tongue(frame: Frame, exit: Exit, cut: bool = False) -> Shape:
     """Draw the strip that forms the slot, with a grip outside the cup; for a single cell on the axis, leaving along +x.
 
     Its tip is round and stops against the core's riser, its underside rests on the ledge. One that is `cut` from film
     is a plain strip: tape makes its grip.
     """
+    lay = frame.lay
     low, high = exit.low, exit.high
     edge = max(lay.cup[0] - abs(c.x) for c in lay.cells)
     reach = edge + GRIP_GAP + GRIP_LENGTH
     if cut:
-        return strip(dims, 1, reach, exit.width / 2, low, high)
+        return strip(frame.dims, 1, reach, exit.width / 2, low, high)
     half = max(GRIP_WIDTH, exit.width + 4) / 2
     if len(lay.cells) > 1:
         half = max(min(half, lay.pitch / 2 - GRIP_APART), exit.width / 2)
     grip = box(edge + GRIP_GAP, reach, -half, half, low, high)
-    return union((strip(dims, 1, reach - 1, exit.width / 2, low, high), grip))
+    return union((strip(frame.dims, 1, reach - 1, exit.width / 2, low, high), grip))
 
 
-def tongues(dims: Dimensions, lay: Layout, cut: bool = False) -> list[tuple[int, Shape]]:
+def tongues(frame: Frame, cut: bool = False) -> list[tuple[int, Shape]]:
     """Draw every tongue in its place, with the side (+1, -1 along x) that it is pulled out to; printed, or `cut`."""
-    if not dims.exit:
+    if not frame.dims.exit:
         return []
-    one = tongue(dims, lay, dims.exit, cut)
-    return [(s, moved(turned(one, "z", 0 if s > 0 else 2), c.x, c.y)) for c in lay.cells for s in c.sides]
+    one = tongue(frame, frame.dims.exit, cut)
+    return [(s, moved(turned(one, "z", 0 if s > 0 else 2), c.x, c.y)) for c in frame.lay.cells for s in c.sides]
 
 
 PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
@@ -68,21 +69,22 @@ def plate_bottom(spec: Spec) -> float:
     return plate_top(spec) - spec.moulds.plate_mm
 
 
-def base(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
+def base(frame: Frame) -> Shape:
     """Draw plate, keyed plinth and cores in one piece, with pry slots, filament holes and grooves, and ledges."""
+    dims, lay = frame.dims, frame.lay
     tools: list[Shape] = []
-    if design_of(spec).suction:
-        tools += [filament.way(spec, dims, lay, c, plate_bottom(spec)) for c in lay.cells]
+    if design_of(frame.spec).suction:
+        tools += [filament.way(frame, c, plate_bottom(frame.spec)) for c in lay.cells]
     if dims.exit:
-        tools += [moved(notch(spec, dims, dims.exit, s), c.x, c.y) for c in lay.cells for s in c.sides]
-    return stand(spec, lay, [moved(core(dims), c.x, c.y) for c in lay.cells], tools)
+        tools += [moved(notch(frame, dims.exit, s), c.x, c.y) for c in lay.cells for s in c.sides]
+    return stand(frame, [moved(core(dims), c.x, c.y) for c in lay.cells], tools)
 
 
-def stand(spec: Spec, lay: Layout, standing: Sequence[Shape], tools: Sequence[Shape] = ()) -> Shape:
+def stand(frame: Frame, standing: Sequence[Shape], tools: Sequence[Shape] = ()) -> Shape:
     """Draw plate and plinth with the parts on them (feet sunk in) in one piece, with pry slots, less `tools`."""
-    top, bottom = plate_top(spec), plate_bottom(spec)
-    plate = Extrude(outline(lay.plate, MARK), bottom, top)
-    return cut(union((plate, plinth(spec, lay), *standing)), [*(pry_slot(spec, lay, side) for side in (1, -1)), *tools])
+    top, bottom = plate_top(frame.spec), plate_bottom(frame.spec)
+    plate = Extrude(outline(frame.lay.plate, MARK), bottom, top)
+    return cut(union((plate, plinth(frame), *standing)), [*(pry_slot(frame, side) for side in (1, -1)), *tools])
 
 
 def pry_floor(spec: Spec) -> float:
@@ -92,9 +94,9 @@ def pry_floor(spec: Spec) -> float:
     return bottom + (math.floor(wanted / layer + 1e-6) * layer if wanted >= layer else wanted)
 
 
-def plinth(spec: Spec, lay: Layout) -> Shape:
+def plinth(frame: Frame) -> Shape:
     """Draw the keyed square on the plate that every cup fits over; its top is the seat z = 0."""
-    return draw_taper(lay, 0.0, plate_top(spec))
+    return draw_taper(frame.lay, 0.0, plate_top(frame.spec))
 
 
 def core(dims: Dimensions) -> Shape:
@@ -102,10 +104,10 @@ def core(dims: Dimensions) -> Shape:
     return solid_within(dims.core_outline, -BEYOND, dims.core_height)
 
 
-def notch(spec: Spec, dims: Dimensions, exit: Exit, side: int) -> Shape:
+def notch(frame: Frame, exit: Exit, side: int) -> Shape:
     """Draw what the ledge removes from a core: the tongue's seat and a window's clearance next to it, open upwards."""
-    half = exit.width / 2 + spec.moulds.window_clearance_mm
-    return strip(dims, side, dims.cavity_radius + BEYOND, half, exit.low, exit.high + BEYOND)
+    half = exit.width / 2 + frame.spec.moulds.window_clearance_mm
+    return strip(frame.dims, side, frame.dims.cavity_radius + BEYOND, half, exit.low, exit.high + BEYOND)
 
 
 def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile:
@@ -126,8 +128,8 @@ def draw_taper(lay: Layout, clearance: float, bottom: float) -> Shape:
     return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
 
 
-def pry_slot(spec: Spec, lay: Layout, side: int) -> Shape:
+def pry_slot(frame: Frame, side: int) -> Shape:
     """Draw a slot in the plate's edge that reaches under the skirt: a screwdriver lifts the cup there."""
-    inner, outer = side * (lay.cup[0] - PRY_UNDER), side * (lay.plate[0] + BEYOND)
-    ends, top = (min(inner, outer), max(inner, outer)), plate_top(spec) + BEYOND / 4
-    return box(*ends, -PRY_HALF_WIDTH, PRY_HALF_WIDTH, pry_floor(spec), top)
+    inner, outer = side * (frame.lay.cup[0] - PRY_UNDER), side * (frame.lay.plate[0] + BEYOND)
+    ends, top = (min(inner, outer), max(inner, outer)), plate_top(frame.spec) + BEYOND / 4
+    return box(*ends, -PRY_HALF_WIDTH, PRY_HALF_WIDTH, pry_floor(frame.spec), top)

@@ -39,7 +39,7 @@ from unitcad.kernels.mesh import (
 from unitcad.moulds import lid
 from unitcad.moulds.base import stand
 from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
-from unitcad.moulds.layout import layout
+from unitcad.moulds.layout import Frame
 from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, lid_piece
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
 from unitcad.shape.profile import GRID_PER_MM
@@ -91,20 +91,21 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         seat = max(radii) + spec.moulds.land_mm + spec.moulds.groove_width_mm
         standing = [Common((piece, box(-seat, seat, -seat, seat, -BEYOND, tops))) for piece in standing]
     dims = replace(given, radii=radii, heights=rims, core_height=tops, exit=None, sides=())
-    lay = layout(spec, dims)
+    frame = Frame.of(spec, dims)
+    lay = frame.lay
 
     def in_cells(shapes: Sequence[Shape]) -> list[Shape]:
         return [moved(shape, cell.x, cell.y) for cell in lay.cells for shape in shapes]
 
-    base = stand(spec, lay, in_cells(standing))
+    base = stand(frame, in_cells(standing))
     solid_of = [realise(piece, segments).trim_by_plane((0, 0, 1), 0.0) for piece in standing]
     cups, sealed, grooved = [], [], []
     wall_kept = min(spec.moulds.least_wall_mm, spec.moulds.land_mm) - LEVEL
     for i, rim in enumerate(rims):
-        blank, under = cup_blank(spec, lay, rim), Below(union(cast[: i + 1]), -BEYOND)
+        blank, under = cup_blank(frame, rim), Below(union(cast[: i + 1]), -BEYOND)
         slots = [_grown(Below(shape, skirt_end(spec) - BEYOND), clearance) for shape in there(i)]
         wall = Manifold.batch_boolean(
-            [realise(shape, segments) for shape in (blank, under, recess(spec, lay), *standing, *slots)],
+            [realise(shape, segments) for shape in (blank, under, recess(frame), *standing, *slots)],
             OpType.Subtract,
         )
         slid = slots + [
@@ -112,13 +113,13 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             for piece, solid in zip(standing, solid_of, strict=True)
             if wall.min_gap(solid, 2 * clearance) < clearance
         ]
-        overflow = grooves(spec, dims, lay, i)
-        own = realise(groove(spec, dims, i, replace(lay.cells[0], x=0.0, y=0.0)), segments)
+        overflow = grooves(frame, i)
+        own = realise(groove(frame, i, replace(lay.cells[0], x=0.0, y=0.0)), segments)
         if any(own.min_gap(realise(hole, segments), wall_kept) < wall_kept for hole in slid):
             overflow = []
         grooved.append(bool(overflow))
         bores, holes = in_cells([under]), in_cells(slid)
-        cup = cut(blank, [recess(spec, lay), *bores, *holes, *overflow])
+        cup = cut(blank, [recess(frame), *bores, *holes, *overflow])
         parted = _pieces(realise(cup, segments))
         if len(parted) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
@@ -131,8 +132,8 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells([*standing, *there(i)]))),) if holes else ())
     tools, channels = [base_piece(base), *(cup_piece(i + 1, cup) for i, cup in enumerate(cups))], []
     for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)) if injected else ():
-        drilled, poured = (lid.channels_over(spec, dims, lay, i, solid.slice(rim - _UNDER), by) for by in (BEYOND, 0.0))
-        tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i, drilled, in_cells(hung[i]))))
+        drilled, poured = (lid.channels_over(frame, i, solid.slice(rim - _UNDER), by) for by in (BEYOND, 0.0))
+        tools.append(lid_piece(i + 1, lid.lid(frame, i, drilled, in_cells(hung[i]))))
         channels.append(tuple(poured))
     tools += [] if injected else [blade_piece(blade(lay, dims.heights[-1]))]
     return Tooling(dims, lay, tuple(tools), tuple(sealed), tuple(channels), tuple(grooved))

@@ -42,12 +42,11 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
-from unitcad.designs import Dimensions
-from unitcad.designs.design import BEYOND, Cell, Layout, solid_within
+from unitcad.designs.design import BEYOND, Cell, solid_within
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.limits import CREST, LEAF_WIDTH, leaf_mm
 from unitcad.moulds.base import draw_taper, outline, plate_bottom, plate_top
-from unitcad.moulds.layout import CORNER_RADIUS, EPS, MARK, PLINTH_DRAFT_DEG, groove_depth_of
+from unitcad.moulds.layout import CORNER_RADIUS, EPS, MARK, PLINTH_DRAFT_DEG, Frame, groove_depth_of
 from unitcad.shape import Extrude, Profile, Revolve, Shape, box, cut, moved, polygon, ring, union
 from unitcad.shape.profile import mm
 from unitcad.spec import Spec, printer_of
@@ -116,13 +115,12 @@ class Rib:
     head: float
 
 
-def ribs(spec: Spec, lay: Layout) -> tuple[Rib, ...]:
+def ribs(frame: Frame) -> tuple[Rib, ...]:
     """Return the ribs of every cup of a set; () if the spec sets none, or the plinth's faces are too short."""
-    moulds = spec.moulds
-    crest = float(printer_of(spec).least_feature_mm)
+    moulds, lay, printer = frame.spec.moulds, frame.lay, printer_of(frame.spec)
+    crest, leaf = float(printer.least_feature_mm), leaf_mm(printer)
     end = -moulds.plinth_height_mm + moulds.seat_relief_mm
     corner = max(lay.key, CORNER_RADIUS)
-    leaf = leaf_mm(printer_of(spec))
     return place_ribs(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, leaf)
 
 
@@ -206,28 +204,29 @@ def _strip(rib: Rib, near: float, far: float, t0: float, t1: float, z: float) ->
     return polygon(*((rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t) for d, t in corners))
 
 
-def slot_shapes(spec: Spec, lay: Layout) -> list[Shape]:
+def slot_shapes(frame: Frame) -> list[Shape]:
     """Draw the slots round the leaves of every cup of a set; none if its ribs are on the wall itself."""
-    slots = leaf_slots(ribs(spec, lay), spec.moulds.plinth_clearance_mm, leaf_mm(printer_of(spec)))
+    slots = leaf_slots(ribs(frame), frame.spec.moulds.plinth_clearance_mm, leaf_mm(printer_of(frame.spec)))
     return [union(slots)] if slots else []
 
 
-def rib_shapes(spec: Spec, lay: Layout) -> list[Shape]:
+def rib_shapes(frame: Frame) -> list[Shape]:
     """Draw the ribs of every cup of a set, reaching into plinth and wall."""
+    spec = frame.spec
     moulds = spec.moulds
     root = min(ROOT, moulds.skirt_wall_mm / 2, (leaf_mm(printer_of(spec)) or moulds.skirt_wall_mm) / 2)
     crest = float(printer_of(spec).least_feature_mm)
-    return drawn(ribs(spec, lay), moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, root)
+    return drawn(ribs(frame), moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, root)
 
 
-def rib_spaces(spec: Spec, lay: Layout) -> list[Shape]:
+def rib_spaces(frame: Frame) -> list[Shape]:
     """Draw a box round each rib, from behind its wall to before its tip: a check of other faces ignores it."""
-    moulds = spec.moulds
+    moulds = frame.spec.moulds
     before = moulds.rib_interference_mm * SQUARE + AROUND
     behind = moulds.plinth_clearance_mm * SQUARE + AROUND
-    half = float(printer_of(spec).least_feature_mm) / 2 + before + behind
+    half = float(printer_of(frame.spec).least_feature_mm) / 2 + before + behind
     boxes = []
-    for rib in ribs(spec, lay):
+    for rib in ribs(frame):
         (nx, ny), near, far = rib.inwards, rib.head * SLOPE + before, rib.foot * SLOPE - behind
         x, y = zip(
             *((rib.x + nx * d - ny * t, rib.y + ny * d + nx * t) for d, t in ((near, half), (far, -half))), strict=True
@@ -236,24 +235,25 @@ def rib_spaces(spec: Spec, lay: Layout) -> list[Shape]:
     return boxes
 
 
-def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int, wider: float = 0.0) -> Shape:
+def cup(frame: Frame, layer: int, wider: float = 0.0) -> Shape:
     """Draw the one-piece cup of a layer (from 0): recess over the plinth, seat at z = 0, bores, windows, grooves."""
-    rim = dims.heights[layer]
-    tools: list[Shape] = [recess(spec, lay), *bores(dims, lay, layer, wider)]
-    tools += grooves(spec, dims, lay, layer)
-    tools += windows(spec, dims, lay, rim)
-    return cut(cup_blank(spec, lay, rim), tools)
+    rim = frame.dims.heights[layer]
+    tools: list[Shape] = [recess(frame), *bores(frame, layer, wider)]
+    tools += grooves(frame, layer)
+    tools += windows(frame, rim)
+    return cut(cup_blank(frame, rim), tools)
 
 
-def bores(dims: Dimensions, lay: Layout, layer: int, wider: float = 0.0) -> list[Shape]:
+def bores(frame: Frame, layer: int, wider: float = 0.0) -> list[Shape]:
     """Draw the bores of a cup (from 0), longer than it at both ends and `wider` all round, mm."""
-    bore = solid_within(tuple((r + wider, z) for r, z in dims.outside(layer)), -BEYOND, dims.heights[layer] + BEYOND)
-    return [moved(bore, cell.x, cell.y) for cell in lay.cells]
+    side, rim = frame.dims.outside(layer), frame.dims.heights[layer]
+    bore = solid_within(tuple((r + wider, z) for r, z in side), -BEYOND, rim + BEYOND)
+    return [moved(bore, cell.x, cell.y) for cell in frame.lay.cells]
 
 
-def cup_blank(spec: Spec, lay: Layout, rim: float) -> Shape:
+def cup_blank(frame: Frame, rim: float) -> Shape:
     """Draw the block that a cup is cut from: the skirt ends above the plate, so that the seat bears."""
-    return Extrude(outline(lay.cup, MARK), skirt_end(spec), rim)
+    return Extrude(outline(frame.lay.cup, MARK), skirt_end(frame.spec), rim)
 
 
 def skirt_end(spec: Spec) -> float:
@@ -261,27 +261,29 @@ def skirt_end(spec: Spec) -> float:
     return plate_top(spec) + spec.moulds.seat_relief_mm
 
 
-def recess(spec: Spec, lay: Layout) -> Shape:
+def recess(frame: Frame) -> Shape:
     """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides, less
     the ribs that centre the cup, and the slots round the leaves of ribs of resin.
     """
-    room = cut(draw_taper(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
-    return union((room, *slots)) if (slots := slot_shapes(spec, lay)) else room
+    wider = frame.spec.moulds.plinth_clearance_mm * SQUARE
+    room = cut(draw_taper(frame.lay, wider, skirt_end(frame.spec)), rib_shapes(frame))
+    return union((room, *slots)) if (slots := slot_shapes(frame)) else room
 
 
-def grooves(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+def grooves(frame: Frame, layer: int) -> list[Shape]:
     """Draw the overflow grooves of all cells, neighbours joined if the web between them would be too thin."""
-    return [groove(spec, dims, layer, cell) for cell in lay.cells] + _joints(spec, dims, lay, layer)
+    return [groove(frame, layer, cell) for cell in frame.lay.cells] + _joints(frame, layer)
 
 
-def _joints(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+def _joints(frame: Frame, layer: int) -> list[Shape]:
     """Draw the webs between neighbours' grooves that are thinner than the least wall.
 
     The pitch is the outermost layer's, whose grooves overlap: those of the layers inside it may just miss each other.
     The circles are polygons within the tolerance, so that is added to the wall on both sides. The lands stay whole.
     """
-    moulds, rim, tolerance = spec.moulds, dims.heights[layer], spec.output.tolerance_mm
-    outer = dims.radii[layer] + moulds.land_mm + moulds.groove_width_mm
+    spec, lay = frame.spec, frame.lay
+    moulds, rim, tolerance = spec.moulds, frame.dims.heights[layer], spec.output.tolerance_mm
+    outer = frame.dims.radii[layer] + moulds.land_mm + moulds.groove_width_mm
     web, wall = lay.pitch - 2 * outer, moulds.least_wall_mm + 2 * tolerance
     if not -tolerance < web < wall:
         return []
@@ -296,8 +298,9 @@ def _joints(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape
     ]
 
 
-def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
+def groove(frame: Frame, layer: int, cell: Cell) -> Shape:
     """Draw the overflow groove behind the land; it stops over a window if the wall would be too thin."""
+    spec, dims = frame.spec, frame.dims
     moulds, rim, radius = spec.moulds, dims.heights[layer], dims.radii[layer]
     inner = radius + moulds.land_mm
     outer = inner + moulds.groove_width_mm
@@ -315,15 +318,15 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
     return moved(channel, cell.x, cell.y)
 
 
-def windows(spec: Spec, dims: Dimensions, lay: Layout, rim: float) -> list[Shape]:
+def windows(frame: Frame, rim: float) -> list[Shape]:
     """Draw the passages of the tongues through the wall of a cup of that rim, from each cell outwards to the edge."""
-    if not dims.exit:
+    if not frame.dims.exit:
         return []
-    half, low, high = window_section(spec, dims.exit, rim)
-    edge = lay.cup[0] + BEYOND
+    half, low, high = window_section(frame.spec, frame.dims.exit, rim)
+    edge = frame.lay.cup[0] + BEYOND
     return [
         box(min(c.x, s * edge), max(c.x, s * edge), c.y - half, c.y + half, low, high)
-        for c in lay.cells
+        for c in frame.lay.cells
         for s in c.sides
     ]
 

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 
-from unitcad.designs import Dimensions
 from unitcad.designs.design import BEYOND, Cell, Layout
 from unitcad.designs.limits import filament_groove
+from unitcad.moulds.layout import Frame
 from unitcad.shape import Profile, Revolve, Shape, box, cylinder, moved, polygon, ring, turned, union
-from unitcad.spec import Spec
 
 FLARE = 1.0
 """Of the filament hole's lower end: the filament bends round it."""
@@ -23,8 +22,9 @@ BITE = 1 / 16
 _QUARTER = math.tan(math.pi / 8)
 
 
-def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
+def way(frame: Frame, cell: Cell, bottom: float) -> Shape:
     """Draw the hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
+    spec = frame.spec
     radius, depth = spec.moulds.filament_hole_mm / 2, filament_groove(spec)
     roof, layer = bottom + depth, spec.moulds.layer_mm
     below = roof - math.ceil(BEYOND / 2 / layer - 1e-6) * layer  # the floor next to the groove ends a whole layer
@@ -34,48 +34,49 @@ def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) ->
             (radius + FLARE, below),
             (radius + FLARE, roof),
             (radius, roof + FLARE),
-            (radius, dims.core_height + BEYOND),
-            (0, dims.core_height + BEYOND),
+            (radius, frame.dims.core_height + BEYOND),
+            (0, frame.dims.core_height + BEYOND),
         )
     )
-    channel = box(-depth / 2, depth / 2, -_length(spec, lay, cell), radius + FLARE, bottom - BEYOND, roof)
+    channel = box(-depth / 2, depth / 2, -_length(frame, cell), radius + FLARE, bottom - BEYOND, roof)
     return moved(union((hole, channel)), cell.x, cell.y)
 
 
-def groove(spec: Spec, lay: Layout, cell: Cell) -> tuple[float, float, float, float]:
+def groove(frame: Frame, cell: Cell) -> tuple[float, float, float, float]:
     """Return the groove's rectangle in the plate's lower face: x0, y0, x1, y1 (mm)."""
-    half, up = filament_groove(spec) / 2, spec.moulds.filament_hole_mm / 2 + FLARE
-    return cell.x - half, cell.y - _length(spec, lay, cell), cell.x + half, cell.y + up
+    half, up = filament_groove(frame.spec) / 2, frame.spec.moulds.filament_hole_mm / 2 + FLARE
+    return cell.x - half, cell.y - _length(frame, cell), cell.x + half, cell.y + up
 
 
-def piece(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
+def piece(frame: Frame, cell: Cell, bottom: float) -> Shape:
     """Draw the filament itself: flush with the core's top, its bent end on the bench."""
-    radius = spec.moulds.filament_mm / 2
+    radius = frame.spec.moulds.filament_mm / 2
     elbow = bottom + radius
     ball = Revolve(Profile(((0, -radius, _QUARTER), (radius, 0, _QUARTER), (0, radius, 0.0))))
-    upright = cylinder(radius, elbow, dims.core_height)
-    outside = FILAMENT_TAIL - BEYOND if _meets_edge(lay, cell) else 0.0
-    lying = turned(cylinder(radius, 0, _length(spec, lay, cell) - radius + outside), "x", 1)
+    upright = cylinder(radius, elbow, frame.dims.core_height)
+    outside = FILAMENT_TAIL - BEYOND if _meets_edge(frame.lay, cell) else 0.0
+    lying = turned(cylinder(radius, 0, _length(frame, cell) - radius + outside), "x", 1)
     bent = union((upright, moved(ball, z=elbow), moved(lying, z=elbow)))
     return moved(bent, cell.x, cell.y)
 
 
-def annulus(spec: Spec, dims: Dimensions, cell: Cell) -> Shape:
+def annulus(frame: Frame, cell: Cell) -> Shape:
     """Draw the ring between filament and hole: too narrow for silicone of these viscosities to matter, so a seal.
 
     It reaches into both walls, or faces that coincide could leave a way of no width along them.
     """
-    inner = spec.moulds.filament_mm / 2 - BITE
-    outer = spec.moulds.filament_hole_mm / 2 + BITE
-    return moved(ring(inner, outer, -BEYOND, dims.core_height), cell.x, cell.y)
+    inner = frame.spec.moulds.filament_mm / 2 - BITE
+    outer = frame.spec.moulds.filament_hole_mm / 2 + BITE
+    return moved(ring(inner, outer, -BEYOND, frame.dims.core_height), cell.x, cell.y)
 
 
 def _meets_edge(lay: Layout, cell: Cell) -> bool:
     return cell.y == min(c.y for c in lay.cells)
 
 
-def _length(spec: Spec, lay: Layout, cell: Cell) -> float:
+def _length(frame: Frame, cell: Cell) -> float:
     """Return the groove's length: to beyond the plate's edge at -y, or as the pitch allows behind another cell."""
+    lay = frame.lay
     if _meets_edge(lay, cell):
         return cell.y + lay.plate[1] + BEYOND
-    return lay.pitch - spec.moulds.filament_hole_mm / 2 - FLARE - 2 * spec.moulds.least_wall_mm
+    return lay.pitch - frame.spec.moulds.filament_hole_mm / 2 - FLARE - 2 * frame.spec.moulds.least_wall_mm

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from unitcad.catalogue import printers
 from unitcad.designs import Dimensions
@@ -25,6 +26,20 @@ EPS = 1e-6
 _LABEL_GAP = 0.6
 MOST_CELLS = 255
 """Cells are numbered by two hexadecimal digits."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The inputs of every tool's drawing: the spec, the lengths of the silicone as it is poured, and the layout."""
+
+    spec: Spec
+    dims: Dimensions
+    lay: Layout
+
+    @classmethod
+    def of(cls, spec: Spec, dims: Dimensions) -> Frame:
+        """Return the frame of a spec with its layout. Raises Refusal as `layout` does."""
+        return cls(spec, dims, layout(spec, dims))
 
 
 def layout(spec: Spec, dims: Dimensions) -> Layout:

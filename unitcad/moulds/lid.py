@@ -26,14 +26,14 @@ import numpy as np
 from manifold3d import CrossSection
 
 from unitcad.designs import Dimensions
-from unitcad.designs.design import BEYOND, Layout
+from unitcad.designs.design import BEYOND
 from unitcad.designs.dimensions import WIRE_GAP, Exit
 from unitcad.designs.limits import EPS, down
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import thick_parts, widest
 from unitcad.moulds.base import outline
 from unitcad.moulds.cup import grooves, window_section
-from unitcad.moulds.layout import MARK
+from unitcad.moulds.layout import MARK, Frame
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, mm, moved, polygon, union
 from unitcad.spec import Spec
 
@@ -61,16 +61,17 @@ def under_tongue(dims: Dimensions, exit: Exit, layer: int) -> float:
     return (bore - math.sqrt(max(bore**2 - half**2, 0.0))) * math.sin(math.radians(TILT_DEG))
 
 
-def widest_tongue(spec: Spec, dims: Dimensions, layer: int) -> float:
+def widest_tongue(frame: Frame, layer: int) -> float:
     """Return the width up to which air under a tongue gets out of a pour, mm: `under_tongue` solved for it."""
-    bore = dims.radii[layer]
-    drop = min(MESH_ROOM * deepest(spec, layer) / math.sin(math.radians(TILT_DEG)), bore)
+    bore = frame.dims.radii[layer]
+    drop = min(MESH_ROOM * deepest(frame.spec, layer) / math.sin(math.radians(TILT_DEG)), bore)
     return 2 * math.sqrt(bore**2 - (bore - drop) ** 2)
 
 
-def check_tongue(spec: Spec, dims: Dimensions) -> None:
+def check_tongue(frame: Frame) -> None:
     """Raise Refusal if a tongue is too wide for the air under it to get out."""
-    widths = [widest_tongue(spec, dims, layer) for layer in range(len(spec.layers))]
+    spec, dims = frame.spec, frame.dims
+    widths = [widest_tongue(frame, layer) for layer in range(len(spec.layers))]
     if not dims.exit or dims.exit.width <= min(widths) + EPS:
         return
     layer = widths.index(min(widths))
@@ -98,26 +99,25 @@ GATE = 0.8
 """Diameter of an opening into a ring, over the ring's width."""
 
 
-def lid(
-    spec: Spec, dims: Dimensions, lay: Layout, layer: int, drilled: Sequence[Shape], cores: Sequence[Shape] = ()
-) -> Shape:
+def lid(frame: Frame, layer: int, drilled: Sequence[Shape], cores: Sequence[Shape] = ()) -> Shape:
     """Draw the lid of a layer's pour (from 0), on the cup's rim: with channels `drilled`, and `cores` under it."""
-    rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm
-    low = skirt_end(spec, dims, layer)
-    room = Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim)
-    plate = Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top)
+    rim, top, play = frame.dims.heights[layer], lid_top(frame.dims, layer), frame.spec.moulds.plinth_clearance_mm
+    low = skirt_end(frame, layer)
+    room = Extrude(outline(frame.lay.cup, MARK, play), low - BEYOND, rim)
+    plate = Extrude(outline(frame.lay.cup, MARK, play + SKIRT_WALL), low, top)
     if cores:
         # A core has nothing over it, so a copy of it that is higher only joins it to the plate.
         return cut(union((cut(plate, [room]), *cores, *(moved(core, z=BEYOND) for core in cores))), drilled)
     return cut(plate, [room, *drilled])
 
 
-def skirt_end(spec: Spec, dims: Dimensions, layer: int) -> float:
+def skirt_end(frame: Frame, layer: int) -> float:
     """Return z of the lower edge of a lid's skirt: above the windows, a whole layer from its printed underside."""
-    rim, top, height = dims.heights[layer], lid_top(dims, layer), spec.moulds.layer_mm
+    dims = frame.dims
+    rim, top, height = dims.heights[layer], lid_top(dims, layer), frame.spec.moulds.layer_mm
     low = rim - SKIRT
     if dims.exit:
-        low = max(low, window_section(spec, dims.exit, rim)[2] + SKIRT_OFF_WINDOW)
+        low = max(low, window_section(frame.spec, dims.exit, rim)[2] + SKIRT_OFF_WINDOW)
     return top - math.floor((top - low) / height + 1e-6) * height
 
 
@@ -126,12 +126,13 @@ def lid_top(dims: Dimensions, layer: int) -> float:
     return dims.heights[layer] + THICKNESS
 
 
-def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: float = 0.0) -> list[Shape]:
+def channels(frame: Frame, layer: int, beyond: float = 0.0) -> list[Shape]:
     """Draw sprue and vents, cell by cell, as they fill with silicone; `beyond` (mm) makes them longer at both ends."""
-    rim, top, sprue = dims.heights[layer], lid_top(dims, layer), spec.moulds.sprue_mm / 2
+    dims = frame.dims
+    rim, top, sprue = dims.heights[layer], lid_top(dims, layer), frame.spec.moulds.sprue_mm / 2
     inner, outer = _ceiling(dims, layer)
-    vent, count = vent_diameter(dims, layer) / 2, vents(spec, dims, layer)
-    _check_sprue(spec, dims, layer, count)
+    vent, count = vent_diameter(dims, layer) / 2, vents(frame, layer)
+    _check_sprue(frame, layer, count)
     turns = [math.tau * (k + 0.5) / count for k in range(count)]
     drawn = [
         moved(cylinder(vent, rim - beyond, top + beyond), (outer - vent) * math.cos(a), (outer - vent) * math.sin(a))
@@ -143,7 +144,7 @@ def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: floa
         drawn[0] = moved(cone, middle * math.cos(turns[0]), middle * math.sin(turns[0]))
     else:
         drawn.insert(0, cylinder(sprue, rim - beyond, top + beyond))
-    return [moved(shape, c.x, c.y) for c in lay.cells for shape in drawn]
+    return [moved(shape, c.x, c.y) for c in frame.lay.cells for shape in drawn]
 
 
 def _cone(gate: float, sprue: float, rim: float, top: float, beyond: float) -> Shape:
@@ -153,14 +154,13 @@ def _cone(gate: float, sprue: float, rim: float, top: float, beyond: float) -> S
     return Revolve(polygon(*below, (gate, rim), (sprue, top), *above))
 
 
-def channels_over(
-    spec: Spec, dims: Dimensions, lay: Layout, layer: int, ceiling: CrossSection, beyond: float = 0.0
-) -> list[Shape]:
+def channels_over(frame: Frame, layer: int, ceiling: CrossSection, beyond: float = 0.0) -> list[Shape]:
     """Draw sprue and vents as `channels` does, over a flat top of any outline: the sprue in its widest place.
 
     Each part of the top has vents along its edge, as many as clear the air of a tilted mould.
     """
-    rim, top, sprue = dims.heights[layer], lid_top(dims, layer), spec.moulds.sprue_mm / 2
+    spec = frame.spec
+    rim, top, sprue = frame.dims.heights[layer], lid_top(frame.dims, layer), spec.moulds.sprue_mm / 2
     parts = [(*widest(part), part) for part in thick_parts(ceiling, LEAST_VENT)]
     width, (x, y), _ = max(parts, key=lambda each: each[0], default=(0.0, (0.0, 0.0), ceiling))
     drawn = [moved(_cone(min(sprue, GATE * width / 2), sprue, rim, top, beyond), x, y)]
@@ -173,7 +173,7 @@ def channels_over(
             if _deepest_pocket(part, np.array([*places, (x, y)]), vent) <= MESH_ROOM * deepest(spec, layer):
                 break
         drawn += [moved(cylinder(vent, rim - beyond, top + beyond), *at) for at in places]
-    return [moved(shape, c.x, c.y) for c in lay.cells for shape in drawn]
+    return [moved(shape, c.x, c.y) for c in frame.lay.cells for shape in drawn]
 
 
 def _along(section: CrossSection, count: int) -> list[tuple[float, float]]:
@@ -194,16 +194,16 @@ def _deepest_pocket(part: CrossSection, vents: np.ndarray, vent: float) -> float
     return float(high.max()) * math.sin(math.radians(TILT_DEG))
 
 
-def _check_sprue(spec: Spec, dims: Dimensions, layer: int, count: int) -> None:
+def _check_sprue(frame: Frame, layer: int, count: int) -> None:
     """Raise Refusal for a sprue that runs into the vents."""
-    inner, outer = _ceiling(dims, layer)
-    vent = vent_diameter(dims, layer) / 2
+    inner, outer = _ceiling(frame.dims, layer)
+    vent = vent_diameter(frame.dims, layer) / 2
     middle, rim = (inner + outer) / 2 if inner else 0.0, outer - vent
     apart = math.sqrt(middle**2 + rim**2 - 2 * middle * rim * math.cos(math.tau / count))
     most = math.floor(200 * (apart - vent - SPRUE_OFF_VENT)) / 100
-    if spec.moulds.sprue_mm > most + 1e-9:
+    if frame.spec.moulds.sprue_mm > most + 1e-9:
         limit = f"between {count} vents of {2 * vent:g} mm the sprue of pour {layer + 1} has at most {most:g} mm"
-        raise Refusal("moulds.sprue_mm", spec.moulds.sprue_mm, limit, most if most > 0 else None)
+        raise Refusal("moulds.sprue_mm", frame.spec.moulds.sprue_mm, limit, most if most > 0 else None)
 
 
 def vent_diameter(dims: Dimensions, layer: int) -> float:
@@ -212,11 +212,12 @@ def vent_diameter(dims: Dimensions, layer: int) -> float:
     return min(VENT, GATE * (outer - inner)) if inner else VENT
 
 
-def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
+def vents(frame: Frame, layer: int) -> int:
     """Return how many vents a cavity has: as asked for, or the least number that clears the air.
 
     Raises Refusal for a number that can't clear, naming one that would, and for a ring too narrow for a vent.
     """
+    spec, dims = frame.spec, frame.dims
     inner, outer = _ceiling(dims, layer)
     width = GATE * (outer - inner)
     if dims.exit and dims.exit.high >= dims.heights[layer]:
@@ -268,18 +269,20 @@ FLOOR_MM = 2.0
 """Least thickness under the film, mm, before it ends a whole layer."""
 
 
-def skin_tray(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
+def skin_tray(frame: Frame) -> Shape:
     """Draw the tray, its rim at the top of the last layer."""
-    rim, layer = dims.heights[-1], spec.moulds.layer_mm
+    dims = frame.dims
+    rim, layer = dims.heights[-1], frame.spec.moulds.layer_mm
     floor = math.ceil((FLOOR_MM + dims.skin) / layer - 1e-6) * layer - dims.skin
     film = cylinder(dims.outer_radius, rim - dims.skin, rim + BEYOND)
-    recesses = [moved(film, cell.x, cell.y) for cell in lay.cells]
-    closed = replace(dims, exit=None)
-    blank = Extrude(outline(lay.cup, MARK), rim - dims.skin - floor, rim)
-    return cut(blank, [*recesses, *grooves(spec, closed, lay, len(dims.heights) - 1)])
+    recesses = [moved(film, cell.x, cell.y) for cell in frame.lay.cells]
+    closed = replace(frame, dims=replace(dims, exit=None))
+    blank = Extrude(outline(frame.lay.cup, MARK), rim - dims.skin - floor, rim)
+    return cut(blank, [*recesses, *grooves(closed, len(dims.heights) - 1)])
 
 
-def films(dims: Dimensions, lay: Layout) -> list[Shape]:
+def films(frame: Frame) -> list[Shape]:
     """Draw the films in their tray, one a cell."""
+    dims = frame.dims
     film = cylinder(dims.outer_radius, dims.heights[-1] - dims.skin, dims.heights[-1])
-    return [moved(film, cell.x, cell.y) for cell in lay.cells]
+    return [moved(film, cell.x, cell.y) for cell in frame.lay.cells]

@@ -18,7 +18,7 @@ from unitcad.kernels.mesh import realise, segment_count, thick_parts
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.cavities import Cavity, cavities, united
 from unitcad.moulds.cup import rib_spaces
-from unitcad.moulds.layout import groove_depth_of
+from unitcad.moulds.layout import Frame, groove_depth_of
 from unitcad.moulds.plan import Plan, Step, plan
 from unitcad.shape import Shape
 from unitcad.shape.profile import FACETS
@@ -140,6 +140,11 @@ class MouldSet:
         return replace(drawn, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
 
     @cached_property
+    def frame(self) -> Frame:
+        """Spec, lengths and layout of the tools. Raises Refusal if the moulds can't be made."""
+        return Frame(self.spec, self.plan.dimensions, self.plan.layout)
+
+    @cached_property
     def segments(self) -> int:
         """Sides of every full turn in this set's meshes: one number, so that mating faces mate."""
 
@@ -233,7 +238,7 @@ class MouldSet:
     def rib_spaces(self) -> Manifold:
         """The boxes round the ribs that centre the cups; empty without ribs."""
 
-        return united(self.meshes(rib_spaces(self.spec, self.plan.layout)))
+        return united(self.meshes(rib_spaces(self.frame)))
 
     @cached_property
     def pressed(self) -> dict[str, Manifold]:

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.designs import Dimensions, design_of
+from unitcad.designs import design_of
 from unitcad.designs.design import BEYOND, Layout
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, notch, tongues
 from unitcad.moulds.cup import bores, cup_blank, windows
-from unitcad.moulds.layout import BLADE_HEIGHT, TEXT_MARGIN
+from unitcad.moulds.layout import BLADE_HEIGHT, TEXT_MARGIN, Frame
 from unitcad.shape import Common, Cut, Extrude, Shape, Union, content_hash, cut, moved, polygon, turned
 from unitcad.shape.lettering import HEIGHT, PITCH, engraving, text_width
 from unitcad.shape.tree import Body
-from unitcad.spec import Spec
 
 CAST = "cast"
 """Stands for the silicone of all pours so far, bonded, in the place of a tool's name."""
@@ -61,9 +60,10 @@ def engrave(blank: Shape, letters: list[Shape]) -> Shape:
     return replace(blank, tools=(*blank.tools, *letters)) if isinstance(blank, Cut) else cut(blank, letters)
 
 
-def base_label(spec: Spec, lay: Layout, label: str, top: float) -> list[Shape]:
+def base_label(frame: Frame, label: str, top: float) -> list[Shape]:
     """Draw the base's label on the plate's upper face, z = `top`, in front of the cup."""
-    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
+    lay = frame.lay
+    stroke, depth = frame.spec.moulds.engraving_stroke_mm, frame.spec.moulds.engraving_depth_mm
     text = engraving(label, stroke, top - depth, top + BEYOND)
     width = text_width(label, stroke)
     return [moved(text, -width / 2, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2)]
@@ -80,11 +80,11 @@ def row_width(texts: Sequence[str], stroke: float) -> float:
     return text_width("0".join(texts), stroke)
 
 
-def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
+def corner_labels(frame: Frame, rim: float, label: tuple[str, str, str]) -> list[Shape]:
     """Draw three pairs of characters in a plate's corners, outside all bores; the fourth corner is the key's."""
-    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
+    stroke, depth = frame.spec.moulds.engraving_stroke_mm, frame.spec.moulds.engraving_depth_mm
     width, height = text_width("00", stroke), HEIGHT * stroke
-    x, y = lay.cup[0] - TEXT_MARGIN, lay.cup[1] - TEXT_MARGIN
+    x, y = frame.lay.cup[0] - TEXT_MARGIN, frame.lay.cup[1] - TEXT_MARGIN
     corners = ((-x, y - height), (-x, -y), (x - width, -y))
     return [
         moved(engraving(text, stroke, rim - depth, rim + BEYOND), *corner)
@@ -92,9 +92,10 @@ def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, st
     ]
 
 
-def cell_numbers(spec: Spec, lay: Layout, rim: float) -> list[Shape]:
+def cell_numbers(frame: Frame, rim: float) -> list[Shape]:
     """Draw the number of each of several cells, in the space that the grooves leave at its upper right."""
-    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
+    lay = frame.lay
+    stroke, depth = frame.spec.moulds.engraving_stroke_mm, frame.spec.moulds.engraving_depth_mm
     return [
         moved(
             engraving(c.name, stroke, rim - depth, rim + BEYOND),
@@ -180,21 +181,22 @@ def bar(half: float, rim: float) -> Shape:
     return moved(turned(Extrude(section, -half, half), "x", 1), 0, 0, rim)
 
 
-def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+def seals(frame: Frame, layer: int) -> list[Shape]:
     """Draw the space without tool that silicone is kept from: grease round a tongue, the annulus round a filament.
 
     A window's seal is the part of the cup removed by the window, less the tongue; never a solid built a second time.
     """
+    dims = frame.dims
     seals: list[Shape] = []
     if dims.exit:
-        around = [shape for _, shape in tongues(dims, lay)]
-        walls = cut(cup_blank(spec, lay, dims.heights[layer]), bores(dims, lay, layer))
-        seals += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay, dims.heights[layer])]
+        around = [shape for _, shape in tongues(frame)]
+        walls = cut(cup_blank(frame, dims.heights[layer]), bores(frame, layer))
+        seals += [cut(Common((walls, window)), around) for window in windows(frame, dims.heights[layer])]
         seals += [
-            cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, dims.exit, s), c.x, c.y))), around)
-            for c in lay.cells
+            cut(Common((moved(core(dims), c.x, c.y), moved(notch(frame, dims.exit, s), c.x, c.y))), around)
+            for c in frame.lay.cells
             for s in c.sides
         ]
-    if design_of(spec).suction:
-        seals += [filament.annulus(spec, dims, c) for c in lay.cells]
+    if design_of(frame.spec).suction:
+        seals += [filament.annulus(frame, c) for c in frame.lay.cells]
     return seals

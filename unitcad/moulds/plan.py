@@ -14,7 +14,7 @@ from unitcad.moulds.base import base, plate_bottom, plate_top, tongues
 from unitcad.moulds.complement import complement
 from unitcad.moulds.cup import Pins, cup
 from unitcad.moulds.cuts import Split
-from unitcad.moulds.layout import layout
+from unitcad.moulds.layout import Frame
 from unitcad.moulds.lid import skin_tray
 from unitcad.moulds.pieces import (
     Removal,
@@ -159,9 +159,10 @@ def plan(spec: Spec) -> Plan:
     layers = cast_layers(spec)
     made = _tooling(spec, layers)
     dims, lay = made.dimensions, made.layout
+    frame = Frame(spec, dims, lay)
     # Material variants share pieces: the label depends only on geometry.
     label = set_label((*(tool.in_file.shape for tool in made.tools), *layers))
-    tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
+    tools = tuple(_engraved(tool, frame, label) for tool in made.tools)
     cast = [tuple(place_in_cell(layer, dims, cell) for cell in lay.cells) for layer in layers]
     laid_in, laid = design_of(spec).laid_in, inserts(spec)
     laid = tuple(replace(b, shape=union(place_in_cell(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
@@ -238,18 +239,19 @@ def place_in_cell(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
     return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
 
 
-def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Body:
+def _engraved(tool: Body, frame: Frame, label: str) -> Body:
     """Return the tool with the set's label, and a cup with the numbers of its cells."""
+    dims = frame.dims
     corners = label[:2], label[2:]
     if tool.kind == "base":
-        letters = base_label(spec, lay, f"B{label}", plate_top(spec))
+        letters = base_label(frame, f"B{label}", plate_top(frame.spec))
     elif tool.kind == "cup" and tool.step:
         rim = dims.heights[tool.step - 1]
-        letters = corner_labels(spec, lay, rim, (f"C{tool.step:X}", *corners)) + cell_numbers(spec, lay, rim)
+        letters = corner_labels(frame, rim, (f"C{tool.step:X}", *corners)) + cell_numbers(frame, rim)
     elif tool.kind == "lid" and tool.step:
-        letters = corner_labels(spec, lay, lid.lid_top(dims, tool.step - 1), (f"L{tool.step:X}", *corners))
+        letters = corner_labels(frame, lid.lid_top(dims, tool.step - 1), (f"L{tool.step:X}", *corners))
     elif tool.kind == "tray":
-        letters = corner_labels(spec, lay, dims.heights[-1], ("F", *corners))
+        letters = corner_labels(frame, dims.heights[-1], ("F", *corners))
     else:
         return tool
     file = engrave(tool.file, letters) if tool.file else None
@@ -262,31 +264,31 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     Raises Refusal beyond the bed, for a tail that reaches no edge, and for a tongue or vents that can't clear the air.
     """
     design = design_of(spec)
-    dims = tool_dimensions(spec, design.dimensions(spec))
-    lay, pours = layout(spec, dims), range(len(cast))
-    lid.check_tongue(spec, dims)
+    frame = Frame.of(spec, tool_dimensions(spec, design.dimensions(spec)))
+    dims, lay, pours = frame.dims, frame.lay, range(len(cast))
+    lid.check_tongue(frame)
     injected = spec.moulds.pour == "injected"
-    tools = [base_piece(base(spec, dims, lay))]
+    tools = [base_piece(base(frame))]
     for i in pours:
         wider = spec.moulds.bore_compensation_mm
-        file = cup(spec, dims, lay, i, wider) if wider else None
-        tools.append(cup_piece(i + 1, cup(spec, dims, lay, i), file))
+        file = cup(frame, i, wider) if wider else None
+        tools.append(cup_piece(i + 1, cup(frame, i), file))
         if injected:
-            drilled = lid.channels(spec, dims, lay, i, beyond=BEYOND)
-            tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i, drilled)))
+            drilled = lid.channels(frame, i, beyond=BEYOND)
+            tools.append(lid_piece(i + 1, lid.lid(frame, i, drilled)))
     brittle = printer_of(spec).technology.value == "sla"
-    tools += tongue_pieces(tongues(dims, lay, cut=brittle), brittle)
+    tools += tongue_pieces(tongues(frame, cut=brittle), brittle)
     if design.suction:
-        tools += filament_pieces([filament.piece(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
+        tools += filament_pieces([filament.piece(frame, cell, plate_bottom(spec)) for cell in lay.cells])
     if dims.skin:
-        tools.append(tray_piece(skin_tray(spec, dims, lay)))
+        tools.append(tray_piece(skin_tray(frame)))
     if not injected:
         tools.append(blade_piece(blade(lay, dims.heights[-1])))
     return Tooling(
         dims,
         lay,
         tuple(tools),
-        seals=tuple(tuple(seals(spec, dims, lay, i)) for i in pours),
-        channels=tuple(tuple(lid.channels(spec, dims, lay, i)) for i in pours) if injected else (),
+        seals=tuple(tuple(seals(frame, i)) for i in pours),
+        channels=tuple(tuple(lid.channels(frame, i)) for i in pours) if injected else (),
         concentric=True,
     )

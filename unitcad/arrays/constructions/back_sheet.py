@@ -29,7 +29,7 @@ from unitcad.arrays.piece_seams import (
 )
 from unitcad.arrays.sheet import bent_stretches, draw_groove, draw_sheet, stopped_ring
 from unitcad.arrays.tails import CLEAR
-from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
+from unitcad.designs import design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import ADHESIVE, BEYOND, Cell, Fitting, Layout, bond
 from unitcad.designs.limits import filament_groove
 from unitcad.errors import Refusal
@@ -38,7 +38,7 @@ from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
 from unitcad.moulds.cup import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.cuts import BESIDE, Feature, Interval, Seam, split, strips, unseen
-from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
+from unitcad.moulds.layout import MARK, TEXT_MARGIN, Frame, groove_depth_of
 from unitcad.moulds.pieces import (
     CAST,
     Removal,
@@ -75,14 +75,11 @@ LABEL_MARGIN = 0.6
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """Dimensions of all tools of an array, and the cuts of base and cups that are larger than the bed."""
+class Drawing(Frame):
+    """The frame of all tools of an array, and the cuts of base and cups that are larger than the bed."""
 
     array: Array
-    spec: Spec
-    dims: Dimensions
     fins: tuple[Fin, ...]
-    lay: Layout
     pins: Pins
     base_seams: tuple[Seam, ...] = ()
     cup_seams: tuple[Seam, ...] = ()
@@ -112,7 +109,7 @@ def drawing_of(array: Array) -> Drawing:
     pitch = min(array.pitch_mm, 2 * cup[1])
     # No plinth, so no ribs on it.
     lay = Layout(cells, MARK, pitch, (0.0, 0.0), cup, plate, label)
-    drawn = Drawing(array, spec, dims, fins(array), lay, Pins(places, height, moulds.plinth_clearance_mm))
+    drawn = Drawing(spec, dims, lay, array, fins(array), Pins(places, height, moulds.plinth_clearance_mm))
     return _cut(drawn)
 
 
@@ -130,7 +127,7 @@ def _cut(drawn: Drawing) -> Drawing:
     layer_mm3 = sheet_mm2(array) * sheet.thickness_mm + moats
     fault = too_much(array, (-x, -y, x, y), (sheet.low, dims.heights[-1]), layer_mm3)
 
-    under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
+    under = [box_feature(*filament.groove(drawn, cell)) for cell in drawn.lay.cells]
     base = seams_of(
         array,
         (-plate[0], -plate[1], *plate),
@@ -217,7 +214,7 @@ def flat_plan(array: Array, cast: Sequence[tuple[Shape, ...]], label: str = "") 
     label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
     base = base_piece(engrave(blanks[0], list(_base_letters(drawing, f"B{label}"))))
     base = replace(base, removal=DOWN) if any(sheets) else base
-    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, -spec.moulds.plate_mm) for cell in lay.cells])
+    filaments = filament_pieces([filament.piece(drawing, cell, -spec.moulds.plate_mm) for cell in lay.cells])
     cups: list[Body] = []
     steps: list[Step] = []
     for pour, (blank, sheet) in enumerate(zip(blanks[1:], sheets, strict=True), 1):
@@ -273,7 +270,7 @@ def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
     spec, lay, rim = drawing.spec, drawing.lay, drawing.dims.heights[pour - 1]
     own, (x, y), stroke = f"C{pour:X}", lay.cup, spec.moulds.engraving_stroke_mm
     if not drawing.cup_seams:
-        return corner_labels(spec, lay, rim, (own, label[:2], label[2:]))
+        return corner_labels(drawing, rim, (own, label[:2], label[2:]))
     hole = drawing.hole
     taken = [(x - MARK, y - MARK, x, y)]
     taken += [(at - hole, beside - hole, at + hole, beside + hole) for at, beside in drawing.pins.places]
@@ -291,9 +288,9 @@ def _base(drawing: Drawing) -> Shape:
     plate = Extrude(outline(lay.plate, MARK), -spec.moulds.plate_mm, 0.0)
     cores = [moved(core(dims), cell.x, cell.y) for cell in lay.cells]
     ridges = [fin.drawn(fin.reach, 0.0, -BEYOND, dims.core_height) for fin in drawing.fins]
-    ways = [filament.way(spec, dims, lay, cell, -spec.moulds.plate_mm) for cell in lay.cells]
+    ways = [filament.way(drawing, cell, -spec.moulds.plate_mm) for cell in lay.cells]
     # Drawn for a plate under a plinth.
-    slots = [moved(pry_slot(spec, lay, side), z=-plate_top(spec)) for side in (1, -1)]
+    slots = [moved(pry_slot(drawing, side), z=-plate_top(spec)) for side in (1, -1)]
     slots += [slot.drawn(lay) for slot in drawing.pry if not slot.customary]
     return cut(union((plate, *cores, *ridges, *standing_pins(drawing.pins))), [*slots, *ways])
 
@@ -367,12 +364,12 @@ def _halfway(a: Point, b: Point, half: float, width: float) -> Feature:
 
 def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
     """Draw the spaces without silicone that no tool fills: grease round the fins, the ring round a filament."""
-    spec, dims, lay, rim = drawing.spec, drawing.dims, drawing.lay, drawing.dims.heights[layer]
+    dims, lay, rim = drawing.dims, drawing.lay, drawing.dims.heights[layer]
     x, y = lay.cup
     wall = cut(box(-x, x, -y, y, -BEYOND, rim), _bores(drawing, layer, last=last))
     ridges = [fin.drawn(fin.reach, 0.0, -2 * BEYOND, dims.core_height) for fin in drawing.fins]
     seals = [cut(Common((wall, union(_slots(drawing)))), ridges)] if drawing.fins else []
-    return seals + [filament.annulus(spec, dims, cell) for cell in lay.cells]
+    return seals + [filament.annulus(drawing, cell) for cell in lay.cells]
 
 
 SEAL = 1.2
@@ -497,21 +494,21 @@ def _at(drawn: Drawing, piece: Box, side: Side) -> Iterator[tuple[Side, float, f
     places = (low + PRY_HALF_WIDTH + STEP * i for i in range(count + 1))
     for middle in sorted(places, key=lambda place: (abs(place - (low + high) / 2), place)):
         beside = (ends[0] + 2 * PIN_RADIUS < middle - near, middle + near < ends[1] - 2 * PIN_RADIUS)
-        depth = _depth(drawn.spec, drawn.lay, side, middle)
+        depth = _depth(drawn, side, middle)
         if any(beside) and depth and all(abs(middle - pin) >= near for pin in standing):
             yield side, middle, depth
             return
 
 
-def _depth(spec: Spec, lay: Layout, side: Side, middle: float) -> float:
+def _depth(drawn: Drawing, side: Side, middle: float) -> float:
     """Return a slot's depth, mm: less over a filament's groove; 0 if it would be too little."""
-    moulds, wall = spec.moulds, spec.moulds.least_wall_mm
+    moulds, lay, wall = drawn.spec.moulds, drawn.lay, drawn.spec.moulds.least_wall_mm
     most = moulds.plate_mm
     if side == "front":
-        grooves = (filament.groove(spec, lay, cell) for cell in lay.cells)
+        grooves = (filament.groove(drawn, cell) for cell in lay.cells)
         reach = PRY_HALF_WIDTH + wall
         if any(x0 - reach < middle < x1 + reach and y0 < -lay.cup[1] for x0, y0, x1, _ in grooves):
-            most -= filament_groove(spec)
+            most -= filament_groove(drawn.spec)
     depth = min(PRY_DEPTH, most - wall)
     # The floor on a whole layer from the plate's lower face.
     floor = math.ceil((moulds.plate_mm - depth) / moulds.layer_mm - 1e-6) * moulds.layer_mm
