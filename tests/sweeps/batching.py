@@ -145,11 +145,3 @@ def leftovers(out):
     it, and nobody can tell it from one that a living process has just made.
     """
     return [path for path in out.iterdir() if path.name.startswith(".tmp-") and any(path.iterdir())]
-
-
-def data_of(store, key, make, intact=lambda data: True):
-    """Return the data under a key, made if the store lacks them."""
-    with store.entry(key, intact=intact) as entry:
-        if entry.data is None:
-            entry.data = make()
-    return entry.data

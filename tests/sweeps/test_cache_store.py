@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 
 import pytest
-from batching import data_of
 
 from unitcad.cache import DiskStore, MemoryStore, MissingContent, collect, default_root, usage
 from unitcad.cache import disk as disk_module
@@ -34,9 +33,9 @@ def test_each_key_is_made_once(kind, tmp_path):
     assert first == second
     assert make.count == 1
     assert store.content(first) == b"content"
-    assert data_of(store, "ab2", lambda: {"x": [1.5, None]}) == {"x": [1.5, None]}
-    assert data_of(store, "ab2", lambda: pytest.fail("made twice")) == {"x": [1.5, None]}
-    assert data_of(store, "ab2", lambda: {"y": 1}, intact=lambda data: "y" in data) == {"y": 1}
+    assert store.data("ab2", lambda: {"x": [1.5, None]}) == {"x": [1.5, None]}
+    assert store.data("ab2", lambda: pytest.fail("made twice")) == {"x": [1.5, None]}
+    assert store.data("ab2", lambda: {"y": 1}, intact=lambda data: "y" in data) == {"y": 1}
     assert dict(store.counts) == {"file built": 1, "file reused": 1, "data built": 2, "data reused": 1}
     with pytest.raises(MissingContent):
         store.content("0" * 64)
@@ -74,7 +73,7 @@ def test_no_room_in_the_cache_is_no_error(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
         sha = store.file("ab1", Made())
-        assert data_of(store, "ab2", lambda: 5) == 5
+        assert store.data("ab2", lambda: 5) == 5
     assert store.content(sha) == b"content"
     store.place(sha, tmp_path / "a")
     assert (tmp_path / "a").read_bytes() == b"content"
@@ -241,8 +240,8 @@ def test_an_entry_under_another_key_does_not_count(kind, tmp_path):
     """Moved by hand or by a damaged file system: whole in itself, and the verdict on another part."""
     store = DiskStore(tmp_path / "c")
     if kind == "data":
-        data_of(store, "ab1", lambda: {"status": "ok"})
-        data_of(store, "ab2", lambda: {"status": "broken"})
+        store.data("ab1", lambda: {"status": "ok"})
+        store.data("ab2", lambda: {"status": "broken"})
     else:
         store.file("ab1", Made(b"one"))
         store.file("ab2", Made(b"two"))
@@ -250,7 +249,7 @@ def test_an_entry_under_another_key_does_not_count(kind, tmp_path):
     (folder / "ab2").write_bytes((folder / "ab1").read_bytes())
     again = DiskStore(tmp_path / "c")
     if kind == "data":
-        assert data_of(again, "ab2", lambda: {"status": "broken"}) == {"status": "broken"}
+        assert again.data("ab2", lambda: {"status": "broken"}) == {"status": "broken"}
     else:
         assert again.content(again.file("ab2", Made(b"two"))) == b"two"
     assert dict(again.counts) == {f"{kind} built": 1, "damaged": 1}
@@ -275,11 +274,11 @@ def test_what_is_cleared_away_under_a_store_comes_back(what, tmp_path):
 @pytest.mark.parametrize("by", ["another process", "damage"])
 def test_an_entry_that_changed_is_read_again(by, tmp_path):
     store = DiskStore(tmp_path / "c")
-    data_of(store, "ab1", lambda: {"x": 1})
-    assert data_of(store, "ab1", lambda: pytest.fail("made twice")) == {"x": 1}
+    store.data("ab1", lambda: {"x": 1})
+    assert store.data("ab1", lambda: pytest.fail("made twice")) == {"x": 1}
     if by == "damage":
         entry = tmp_path / "c" / "data" / "ab" / "ab1"
         entry.write_bytes(entry.read_bytes()[:-1] + b" ")
     else:
-        data_of(DiskStore(tmp_path / "c"), "ab1", lambda: {"x": 2}, intact=lambda data: data["x"] == 2)
-    assert data_of(store, "ab1", lambda: {"x": 3}) == {"x": 3 if by == "damage" else 2}
+        DiskStore(tmp_path / "c").data("ab1", lambda: {"x": 2}, intact=lambda data: data["x"] == 2)
+    assert store.data("ab1", lambda: {"x": 3}) == {"x": 3 if by == "damage" else 2}

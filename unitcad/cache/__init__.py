@@ -14,12 +14,11 @@ contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for 
 """
 
 from unitcad.cache.disk import DEFAULT_LIMIT_MB, DiskStore, Usage, collect, default_root, held, is_free, usage
-from unitcad.cache.store import Entry, MemoryStore, MissingContent, Store, digest
+from unitcad.cache.store import MemoryStore, MissingContent, Store, digest
 
 __all__ = [
     "DEFAULT_LIMIT_MB",
     "DiskStore",
-    "Entry",
     "MemoryStore",
     "MissingContent",
     "Store",

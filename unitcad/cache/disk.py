@@ -22,7 +22,7 @@ import msgspec
 import platformdirs
 from filelock import FileLock
 
-from unitcad.cache.store import Entry, Intact, MissingContent, digest
+from unitcad.cache.store import MissingContent, T, digest
 from unitcad.errors import UnitcadError
 from unitcad.files import regular, write_new
 
@@ -64,15 +64,15 @@ class DiskStore:
     def __reduce__(self) -> tuple[type[DiskStore], tuple[Path]]:
         return DiskStore, (self.root,)
 
-    def entry(self, key: str, *, intact: Intact = lambda data: True) -> contextlib.AbstractContextManager[Entry]:
-        return self._entry("data", key, intact)
+    def data(self, key: str, make: Callable[[], T], *, intact: Callable[[T], bool] = lambda data: True) -> T:
+        return self._entry("data", key, make, intact)
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
-        with self._entry("file", key, lambda data: self.has(data["sha256"])) as entry:
-            if entry.data is None:
-                content = make()
-                entry.data = {"sha256": self.keep(content), "size": len(content)}
-        return entry.data["sha256"]
+        def kept() -> dict[str, Any]:
+            content = make()
+            return {"sha256": self.keep(content), "size": len(content)}
+
+        return self._entry("file", key, kept, lambda data: self.has(data["sha256"]))["sha256"]
 
     def has(self, sha256: str) -> bool:
         if sha256 in self._held:
@@ -143,26 +143,23 @@ class DiskStore:
                 raise
         write_new(target, self.content(sha256), sync=True)
 
-    @contextlib.contextmanager
-    def _entry(self, kind: str, key: str, intact: Intact) -> Iterator[Entry]:
+    def _entry(self, kind: str, key: str, make: Callable[[], T], intact: Callable[[T], bool]) -> T:
         path = self._path(kind, key)
-        entry = Entry(self._read(kind, key, intact))
-        if entry.data is None:
+        found = self._read(kind, key, intact)
+        if found is None:
             with held(self.root / "locks" / key):
-                entry.data = self._read(kind, key, intact)  # another process may have made it in the meantime
-                if entry.data is None:
-                    yield entry
-                    payload = json.dumps(entry.data, ensure_ascii=False, allow_nan=False).encode()
+                found = self._read(kind, key, intact)  # another process may have made it in the meantime
+                if found is None:
+                    payload = json.dumps(make(), ensure_ascii=False, allow_nan=False).encode()
                     with contextlib.suppress(OSError):
                         self._write(path, _checksum(kind, key, payload) + b"\n" + payload)
                     self.counts[f"{kind} built"] += 1
-                    entry.data = json.loads(payload)  # as the next reader gets it
-                    return
-        yield entry
+                    return json.loads(payload)  # as the next reader gets it
         self.counts[f"{kind} reused"] += 1
         self._touch(path)
+        return found
 
-    def _read(self, kind: str, key: str, intact: Intact) -> Any:
+    def _read(self, kind: str, key: str, intact: Callable[[Any], bool]) -> Any:
         """Return an entry's data, or None; an entry that is damaged or was written for another key is removed."""
         path = self._path(kind, key)
         try:

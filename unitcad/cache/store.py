@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
 
 from unitcad.errors import UnitcadError
 from unitcad.files import write_new
 
-Intact = Callable[[Any], bool]
+T = TypeVar("T")
 
 
 class MissingContent(UnitcadError):
@@ -23,23 +20,16 @@ class MissingContent(UnitcadError):
     exit_code = 1
 
 
-@dataclass
-class Entry:
-    """The JSON data under a key. They are None if the block that opened the entry has to make them."""
-
-    data: Any = None
-
-
 class Store(Protocol):
     """A cache as a build uses it."""
 
     counts: Counter[str]
     """"built" and "reused" entries, by kind ("data", "file")."""
 
-    def entry(self, key: str, *, intact: Intact = lambda data: True) -> AbstractContextManager[Entry]:
-        """Open the entry of `key`; its data are None if they are missing, damaged, or not `intact`.
+    def data(self, key: str, make: Callable[[], T], *, intact: Callable[[T], bool] = lambda data: True) -> T:
+        """Return the JSON data under `key`, made if they are missing, damaged, or not `intact`.
 
-        The store keeps the data that the block sets when the block ends. It keeps nothing if the block raises.
+        The store keeps nothing if `make` raises.
         """
         ...
 
@@ -73,15 +63,14 @@ class MemoryStore:
         self._data: dict[str, Any] = {}
         self._files: dict[str, str] = {}
 
-    @contextlib.contextmanager
-    def entry(self, key: str, *, intact: Intact = lambda data: True) -> Iterator[Entry]:
-        entry = Entry(self._data.get(key))
-        known = entry.data is not None and intact(entry.data)
-        if not known:
-            entry.data = None
-        yield entry
-        self._data[key] = entry.data
-        self.counts["data reused" if known else "data built"] += 1
+    def data(self, key: str, make: Callable[[], T], *, intact: Callable[[T], bool] = lambda data: True) -> T:
+        found: T | None = self._data.get(key)
+        if found is None or not intact(found):
+            found = self._data[key] = make()
+            self.counts["data built"] += 1
+        else:
+            self.counts["data reused"] += 1
+        return found
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
         known = key in self._files

@@ -12,6 +12,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
 from unitcad.casting.procedure import procedure
 from unitcad.casting.procedure_text import files as written
+from unitcad.catalogue import Printer
 from unitcad.checks import Strain, check_geometry, check_unit, strain_findings, strains
 from unitcad.checks.finding import FindingRecord
 from unitcad.errors import Unfinished
@@ -185,10 +187,12 @@ def finish(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], st
 def geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
     """Return parts, steps, mould findings, mesh findings and files of a set's geometry."""
     key = build_key(moulds, only, check)
-    with store.entry(key, intact=lambda there: all(map(store.has, there["files"].values()))) as entry:
-        if entry.data is None:
-            entry.data = _geometry(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress)
-    return entry.data
+    wanted = [name for name in only if name in GEOMETRIC]
+    return store.data(
+        key,
+        lambda: _geometry(moulds.blank, wanted, check, store, progress),
+        intact=lambda there: all(map(store.has, there["files"].values())),
+    )
 
 
 def _geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
@@ -198,10 +202,8 @@ def _geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, 
     progress("meshes")
     parts: dict[str, PartRecord] = {}
     for body in (body for group in groups(moulds, only) for body in group.bodies):
-        with store.entry(body_key(moulds, body, "record")) as entry:
-            if entry.data is None:
-                entry.data = record(moulds, body)
-        parts[body.name] = PartRecord(**{**entry.data, "files": {}})
+        kept = store.data(body_key(moulds, body, "record"), partial(record, moulds, body))
+        parts[body.name] = PartRecord(**{**kept, "files": {}})
     made: dict[str, str] = {}
 
     def put(planned: Planned) -> None:
@@ -226,7 +228,7 @@ def _geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, 
         "label": moulds.plan.label if pours else None,
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),
         "parts": list(parts.values()),
-        "steps": _pours(moulds, store) if pours else [],
+        "steps": store.data(geometry_key(moulds, "steps"), lambda: _pours(moulds)) if pours else [],
         "mould_checks": findings,
         "strains": strained,
         "check": meshes,
@@ -251,15 +253,11 @@ def _mould_checks(
     if "moulds" not in only and "unit" not in only:
         return [], []
     checked = "mould checks" if "moulds" in only else "overlaps in the unit"
-    with store.entry(geometry_key(moulds, checked)) as findings:
-        if findings.data is None:
-            findings.data = _dicts(check_geometry(moulds) if "moulds" in only else check_unit(moulds))
+    run = check_geometry if "moulds" in only else check_unit
+    findings = store.data(geometry_key(moulds, checked), lambda: _dicts(run(moulds)))
     if "moulds" not in only:
-        return findings.data, []
-    with store.entry(geometry_key(moulds, "strains")) as strained:
-        if strained.data is None:
-            strained.data = [asdict(strain) for strain in strains(moulds)]
-    return findings.data, strained.data
+        return findings, []
+    return findings, store.data(geometry_key(moulds, "strains"), lambda: list(map(asdict, strains(moulds))))
 
 
 def _dicts(findings: Sequence[Any]) -> list[Any]:
@@ -288,21 +286,18 @@ def _round(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}") + 0.0
 
 
-def _pours(moulds: MouldSet, store: Store) -> list[PourRecord]:
-    with store.entry(geometry_key(moulds, "steps")) as entry:
-        if entry.data is None:
-            entry.data = [
-                PourRecord(
-                    index=step.index,
-                    layer=step.name,
-                    material="",
-                    tools=[piece.name for name in step.tools for piece in moulds.plan.pieces_of(name)],
-                    cavity_volume_mm3=_round(sum(c.reached.volume() for c in moulds.cavities if c.step is step), 9),
-                    layer_volume_mm3=_round(moulds.solids[step.name].volume(), 9),
-                )
-                for step in moulds.plan.steps
-            ]
-    return entry.data
+def _pours(moulds: MouldSet) -> list[PourRecord]:
+    return [
+        PourRecord(
+            index=step.index,
+            layer=step.name,
+            material="",
+            tools=[piece.name for name in step.tools for piece in moulds.plan.pieces_of(name)],
+            cavity_volume_mm3=_round(sum(c.reached.volume() for c in moulds.cavities if c.step is step), 9),
+            layer_volume_mm3=_round(moulds.solids[step.name].volume(), 9),
+        )
+        for step in moulds.plan.steps
+    ]
 
 
 def _mesh_checks(moulds: MouldSet, parts: dict[str, PartRecord], store: Store, progress: Progress) -> list[MeshFinding]:
@@ -318,15 +313,19 @@ def _mesh_checks(moulds: MouldSet, parts: dict[str, PartRecord], store: Store, p
     for path, (sha256, role) in listed.items():
         # unitcad checks a tool's STL against the printer; its 3MF has the same meshes.
         printer = printer_of(moulds.spec) if role == "tool" and path.endswith(".stl") else None
-        with store.entry(digest(f"{sha256} {printer!r} {code_version()}".encode())) as entry:
-            if entry.data is None:
-                report = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer))
-                if report.has("F011"):
-                    why = next(finding.message for finding in report.findings if finding.code == "F011")
-                    raise Unfinished(f"{path}: its check was not finished: {why}")
-                entry.data = [finding.as_dict() for finding in report.findings if finding.severity != "info"]
-        found += [MeshFinding(path=path, **finding) for finding in entry.data]
+        key = digest(f"{sha256} {printer!r} {code_version()}".encode())
+        findings = store.data(key, partial(_mesh_check, store, path, sha256, printer))
+        found += [MeshFinding(path=path, **finding) for finding in findings]
     return found
+
+
+def _mesh_check(store: Store, path: str, sha256: str, printer: Printer | None) -> list[dict[str, Any]]:
+    """Return the findings of the mesh rules in one file, but for information. Raises Unfinished."""
+    report = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer))
+    if report.has("F011"):
+        why = next(finding.message for finding in report.findings if finding.code == "F011")
+        raise Unfinished(f"{path}: its check was not finished: {why}")
+    return [finding.as_dict() for finding in report.findings if finding.severity != "info"]
 
 
 def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
@@ -354,10 +353,8 @@ def _estimate(spec: Spec, store: Store) -> tuple[dict[str, Any], bytes]:
     def layered(wanted: EstimateInput) -> dict[str, Any]:
         skin = wanted.tissue_name, wanted.tissue, wanted.frequency
         load = wanted.diameter, wanted.motor_diameter, wanted.drive
-        with store.entry(digest(repr(((*skin, *load), code_version())).encode())) as entry:
-            if entry.data is None:
-                entry.data = rounded_layered(wanted)
-        return entry.data
+        key = digest(repr(((*skin, *load), code_version())).encode())
+        return store.data(key, lambda: rounded_layered(wanted))
 
     reads = estimate_input(spec), spec.estimate
     if reads not in _ESTIMATES:
