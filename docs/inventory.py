@@ -19,6 +19,7 @@ from msgspec import Struct
 
 import unitcad
 from docs.generated import FILES, tables
+from docs.released import PAGE
 from unitcad import catalogue
 from unitcad.arrays.layouts import layouts
 from unitcad.checks import mould_checks
@@ -30,7 +31,6 @@ from unitcad.rooms import commands, file_kinds, load
 from unitcad.spec.fields import fields_of
 from unitcad.validation.load import shipped_of
 
-PAGE = Path(__file__).parent / "reference" / "inventory.md"
 MODULES = ("unitcad", "unitcad.attenuation", "unitcad.arrays", "unitcad.shape", "unitcad.meshcheck", "unitcad.sweeps")
 """Modules whose `__all__` is public."""
 _FILE_NAME = re.compile(r"[\w*][\w.*-]*\.(?:csv|dxf|glb|html|json|md|parquet|pdf|png|step|stl|svg|toml|3mf)")
@@ -55,11 +55,6 @@ def page() -> str:
     for section, entries in inventory().items():
         lines += ["", f"## {section}", "", *(f"- `{entry}`" for entry in entries)]
     return "\n".join(lines) + "\n"
-
-
-def listed(text: str) -> list[str]:
-    """Return the lines of a page of the inventory."""
-    return re.findall(r"(?m)^- `(.+)`$", text)
 
 
 def _options() -> Iterator[str]:

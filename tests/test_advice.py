@@ -58,7 +58,9 @@ def test_a_wide_roof_and_a_wide_ring_are_warned_of_and_a_filled_cavity_is_not():
     assert all("motor.fill = true" in line for line in wide)
     assert len(warnings(load("encapsulating", ["diameter_mm=20"]))) == 1
     assert warnings(load("encapsulating", ["diameter_mm=30", "motor.fill=true"])) == []
-    assert [warnings(load(name)) for name in templates()] == [[]] * len(templates())
+    assert not [
+        line for name in templates() for line in warnings(load(name)) if line.startswith(("caps of", "the motor hangs"))
+    ]
 
 
 def test_leads_without_a_way_out_are_warned_of_and_the_offer_is_accepted():

@@ -5,12 +5,13 @@ import shlex
 import pytest
 
 from tests.in_process import unitcad
+from unitcad.catalogue import materials
 from unitcad.validation.load import shipped_files
 
 UNIT = 'name = "unit"\ndesign = "encapsulating"\ndiameter_mm = 14\n'
 LAYER = '[[layers]]\nmaterial = "{}"\nwall_mm = 1.25\ncap_mm = 1.25\n'
 GOOD = UNIT + LAYER.format("ecoflex-00-10") + LAYER.format("dragon-skin-30")
-SILICONES = "ecoflex-00-10, ecoflex-00-30, ecoflex-00-50, dragon-skin-10-medium, dragon-skin-30"
+SILICONES = ", ".join(materials())
 CURVE = "Strain (%),Stress (kPa)\n" + "".join(f"{i}.5,{i}.5\n" for i in range(60))
 THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; nearest accepted: 12.2"
 

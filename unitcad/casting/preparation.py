@@ -273,7 +273,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         required_tools=("isopropanol and lint-free wipes",),
     )
     exit = moulds.plan.dimensions.exit
-    if exit and (steps := [step for step in moulds.plan.steps if step.windows]):
+    if exit and (steps := [step for step in moulds.plan.steps if moulds.plan.standing(step, "tongue")]):
         windows = [window_section(moulds.spec, exit, step.rim) for step in steps]
         height = number(min(high - low for _, low, high in windows), 2)
         yield BenchStep(
