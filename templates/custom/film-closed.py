@@ -61,6 +61,7 @@ def assembly(spec, dims):
             "it.",
             required_tools=("small brush",),
             mix=True,
+            place="in",
         ),
     ]
 

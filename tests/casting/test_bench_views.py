@@ -2,16 +2,20 @@
 
 import io
 import json
+import re
+from collections import Counter
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.sample_bodies import LEADLESS
 from unitcad.casting.drawings import ARROW, BAND, CARD, TAPE, tongue_prop
+from unitcad.casting.plates import made_pieces, mould_plates
 from unitcad.casting.procedure import procedure
 from unitcad.casting.views import SIZE, BenchPictures, View, picture_path, views
 from unitcad.export.raster import Surface, aim, finish, render
-from unitcad.kernels.mesh import arrays, realise
+from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
 from unitcad.shape import box, moved
@@ -54,7 +58,7 @@ def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source, pla
 def test_views_name_pieces_that_there_are(source, planned):
     moulds, _ = planned(*source)
     plan = moulds.plan
-    tools = {body.name for body in (*plan.tools, *plan.pieces, *plan.steps[-1].inserts)} | {
+    tools = {body.name for body in (*plan.tools, *made_pieces(moulds), *plan.steps[-1].inserts)} | {
         step.name for step in plan.steps
     }
     for name, view in views(moulds).items():
@@ -247,15 +251,162 @@ def _moment(loop):
     return float(((x + u) * (x * v - u * y)).sum() / 6)
 
 
-def test_a_tail_that_leads_through_a_closed_slot_is_shown_in_place_only():
-    """A picture of the parts apart would show a straight way that the tail does not have."""
-    moulds, casting = planned("encapsulating")
-    assert "motor-in" not in views(moulds)
-    assert {step.picture for step in casting.assembly} == {picture_path("motor-home")}
-    assert "motor-in" in views(planned("embedded")[0])
+STATES = [
+    *SETS,
+    ("embedded", "skin_mm=0.5"),
+    ("encapsulating", "motor.lip_mm=0.5"),
+    ("no-fpcb", "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]"),
+    (LEADLESS,),
+    (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]"),
+    ("templates/custom/film-closed.toml",),
+    ("templates/custom/strap-lugs.toml",),
+    ("docs/gallery/gel-pad.toml",),
+]
+
+
+@pytest.mark.parametrize("source", STATES, ids=" ".join)
+def test_each_picture_has_in_it_what_its_step_says(source, planned):
+    """A second account of the bench, from the steps' words only: the pieces on it, the moving one, the side up."""
+    moulds, casting = planned(*source)
+    shown = {picture_path(name): view for name, view in views(moulds).items()}
+    for pour in casting.pours:
+        _follow_pour(moulds, pour, shown)
+    for step in casting.assembly:
+        if step.picture:
+            _motor_as_said(moulds, step, shown[step.picture])
+    pushed = [step for step in casting.assembly if re.search(r"\b(Push|Set|Lay the circuit)\b", step.text)]
+    assert all(step.picture for step in pushed)
+
+
+def _follow_pour(moulds, pour, shown):
+    """Compare each picture of a pour with the pieces that its words have put on, moved and taken off."""
+    n, tongues = pour.index, {tool.name for tool in moulds.plan.of_kind("tongue")}
+    cup, lid, layer = f"cup{n}", f"lid{n}", f"layer{n}"
+    there = set[str]()  # the pieces of this pour that are in their places
+    for step in pour.steps:
+        title, moving = step.title, set[str]()
+        if title == f"Cup {n} on":
+            moving = {cup}
+        elif title.startswith("Tongue in"):
+            moving = tongues
+        elif title == "Tongue home":
+            there |= tongues
+        elif title == f"Lid {n} on":
+            moving = {lid}
+        elif title in ("Pour", "Inject"):
+            there |= {layer}
+        elif title == "Tongue out FIRST":
+            moving, there = tongues, there - tongues
+        elif title in ("Lid off", f"Lid {n} off"):
+            moving, there = {lid}, there - {lid}
+        elif title == f"Cup {n} off":
+            moving, there = {cup}, there - {cup}
+        if step.picture in shown:
+            of_pour = {cup, lid, layer} | tongues
+            parts = [part for part in shown[step.picture].parts if part.name in of_pour]
+            assert {part.name for part in parts if not any(part.moved)} == there, title
+            assert {part.name for part in parts if any(part.moved)} == moving, title
+        there |= moving & ({cup} if title.endswith(" on") else set())
+        there |= {lid} if title == f"Lid {n} on" else set()
+
+
+def _motor_as_said(moulds, step, view):
+    """Check that motor and leads are where a step's words have them, and the side up that these name."""
+    text, below = step.text, moulds.design.opens == "below"
+    arrows = any(extra.colour == ARROW for extra in view.extras)
+    if "skin" in step.title.lower():
+        _skin_as_said(moulds, step, view)
+        return
+    if "mouth up" in text or "cavities' mouths up" in text or "from the skin's side" in text:
+        assert below
+        assert view.turned
+    if "skin side down" in text or "from above" in text:
+        assert not view.turned
+    bodies = {body.name: body for body in (*moulds.unit, *moulds.laid_later) if body.kind == "motor"}
+    motors = [bounds(moulds.mesh(body)) for body in bodies.values()]
+    assert motors
+    placed = [part for part in view.parts if part.name in bodies]
+    low, high = min(box[2] for box in motors), max(box[5] for box in motors)
+    moved = {part.moved for part in placed} or {extra.moved for extra in view.extras if any(extra.moved)}
+    by = next(iter(moved), (0.0, 0.0, 0.0))
+    body = bounds(moulds.mesh(next(body for body in moulds.unit if body.kind == "layer")))
+    if step.title.startswith("Let the"):
+        assert not any(any(each) for each in moved)
+        assert not arrows
+    elif "next to it" in text:
+        assert by[0] > body[3] - motors[0][0]
+    elif "before the cavity's mouth" in text:
+        assert high + by[2] < body[2]
+        assert below
+        leads = [bounds(realise(extra.shape, 32)) for extra in view.extras if extra.colour != ARROW]
+        exit = moulds.dimensions.exit
+        assert leads
+        for lead in leads:  # from the motor's height through the slot to the outside
+            assert lead[2] < low + by[2] + high
+            assert exit.low - 0.02 <= lead[5] <= exit.high + 0.02
+            assert max(-lead[0], lead[3]) > moulds.dimensions.outer_radius
+    elif re.search(r"\b(Push|Set|Lay the circuit in)\b", text):
+        assert arrows
+        assert high + by[2] < body[2] if below else low + by[2] > body[5] - 1e-9
+    else:
+        assert not any(by)
+
+
+def _skin_as_said(moulds, step, view):
+    """The film alone while its tray is filled; then the unit with its motor over it; at last on it, still."""
+    rim, arrows = moulds.dimensions.heights[-1], any(extra.colour == ARROW for extra in view.extras)
+    film, *inside = [extra for extra in view.extras if extra.colour != ARROW]
+    cast = [part for part in view.parts if part.name.startswith("layer")]
+    bought = [body for body in moulds.unit if body.made == "bought"]
+    if step.title == "Fill the skin tray":
+        assert not cast
+        assert not inside
+        return
+    assert len(cast) == len(moulds.plan.steps)
+    assert [extra.colour for extra in inside] == [body.colour for body in bought for _ in moulds.plan.layout.cells]
+    lifts = {item.moved[2] for item in (*cast, *inside)}
+    assert arrows == (step.title == "Skin on")
+    assert lifts == {rim} if step.title == "Let the skin cure" else min(lifts) > rim
+    assert bounds(realise(film.shape, 32))[5] == pytest.approx(rim)
+
+
+@pytest.mark.parametrize("source", STATES, ids=" ".join)
+def test_bill_plate_sheet_and_picture_count_the_same_pieces(source, planned):
+    moulds, casting = planned(*source)
+    counts = {
+        "plate": Counter(body.kind for plate in mould_plates(moulds).values() for body in plate),
+        "picture": Counter(
+            next(piece.kind for piece in made_pieces(moulds) if piece.name == part.name)
+            for part in views(moulds)["pieces"].parts
+            if next(piece.made for piece in made_pieces(moulds) if piece.name == part.name) == "printed"
+        ),
+        "bill": Counter(),
+    }
+    for item in casting.bill:
+        if item.made.startswith("printed"):
+            kind = next(p.kind for p in made_pieces(moulds) if item.item in (moulds.plan.called(p.name), p.kind))
+            counts["bill"][kind] += int(item.quantity)
+    assert counts["plate"] == counts["picture"] == counts["bill"]
+    sheet = casting.printing.how[0]
+    assert ("spare tongue" in sheet) == (counts["plate"]["tongue"] > len(moulds.plan.of_kind("tongue")))
+
+
+def test_times_name_their_temperature_and_what_other_rooms_do():
+    """Twice as fast 10 K warmer: a root of two for 5 K."""
+    _, casting = planned("encapsulating", "casting.room_c=23")
+    mix = next(step for step in casting.pours[0].steps if step.kind == "mix").text
+    assert "30 min at 23 degC" in mix
+    assert f"At 18 degC pot life and cure take {2**0.5:.1f} times as long, at 28 degC {0.5**0.5:.2f} times" in mix
+    assert "rule of thumb" in mix
+    cure = next(step for step in casting.pours[1].steps if step.kind == "cure").text
+    assert "16 h at 23 degC" in cure
+    assert "24 h at 23 degC" in casting.assembly[-1].text
+    cold = next(s for s in planned("encapsulating", "casting.room_c=13")[1].pours[0].steps if s.kind == "mix").text
+    assert "60 min at 13 degC" in cold
 
 
 OF_EVERY_SET = (
+    test_each_picture_has_in_it_what_its_step_says,
     test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn,
     test_views_name_pieces_that_there_are,
     test_a_picture_shows_the_state_that_its_words_speak_of,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.sample_bodies import LEADLESS
-from unitcad.casting.bill import mould_plates
+from unitcad.casting.plates import mould_plates
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import threemf_content
 from unitcad.validation import load

@@ -263,24 +263,25 @@ def assembly_of(moulds):
 
 
 def test_motor_and_circuit_of_a_function_are_put_in():
-    solder, push, rest = assembly_of(of_spec(load(CUSTOM / "strap-lugs.toml")))
+    solder, push = assembly_of(of_spec(load(CUSTOM / "strap-lugs.toml")))
     assert solder.startswith("Solder the motor to the circuit's pad")
-    assert push == "Push the motor, the pad ahead, into the cavity from the skin, and lay the tail in the notch."
-    assert "The design's file says no more of the assembly" in rest
+    way = "Push the motor, the pad ahead, into the cavity from the skin's side, and lay the tail in the notch."
+    assert 0 < push.index("Coat the pad") + 1 < push.index(way)
+    assert "The design's file says no more of the assembly" in push
 
 
 @pytest.mark.parametrize(
     ("more", "first"),
     [
-        ("", "Push the motor into the cavity from the skin."),
+        ("", "Push the motor into the cavity from the skin's side."),
         ("opens='above'", "Push the motor into the cavity from above."),
         ("assembly=lambda spec, dims: ['Glue it in.']", "Glue it in."),
     ],
 )
 def test_the_motor_goes_in_where_the_design_opens_or_as_it_says(more, first, tmp_path):
     steps = assembly_of(of_spec(load(written(tmp_path, OWN.replace("MORE", more)))))
-    assert steps[0] == first
-    assert len(steps) == (1 if "assembly" in more else 2)
+    assert first in steps[0]
+    assert len(steps) == 1
 
 
 @pytest.mark.parametrize(("name", "change"), [("strap-lugs", {}), ("film-closed", {}), ("dome", FLAT_TOP)])

@@ -9,7 +9,7 @@ import pytest
 from faulty_sets import set_of
 
 from unitcad.casting import coupon, figures
-from unitcad.casting.bill import mould_plates
+from unitcad.casting.plates import mould_plates
 from unitcad.casting.preparation import slicer_settings
 from unitcad.catalogue import printers
 from unitcad.export import printing

@@ -16,8 +16,9 @@ from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
 from unitcad.arrays.tails import covered_tails, named
-from unitcad.casting.bill import Item, bill, list_consumables, list_pieces, motor_name, mould_plates
+from unitcad.casting.bill import Item, bill, list_consumables, list_pieces, motor_name
 from unitcad.casting.figures import LAY_IN_MIN, LIFT_MIN, PEEL_MIN, PULL_MIN, Batch
+from unitcad.casting.plates import mould_plates
 from unitcad.casting.pouring import (
     after_pours,
     cure,
@@ -45,13 +46,9 @@ from unitcad.text import join_words, number, spaced
 
 
 def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
-    """Return the steps of the assembly, each with its own title: soldering shows no state of the mould."""
+    """Return the steps of the assembly, each with its own title."""
     solder, lay_in, cure = steps
-    return (
-        replace(solder, title="Solder the motors", picture=""),
-        replace(lay_in, title="Lay the circuit in", picture=picture_path("motor-in")),
-        cure,
-    )
+    return replace(solder, title="Solder the motors"), replace(lay_in, title="Lay the circuit in"), cure
 
 
 def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:

@@ -10,16 +10,13 @@ from dataclasses import dataclass, replace
 
 from unitcad.casting.drawings import tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
+from unitcad.casting.plates import SPARE_TONGUE, made_pieces
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
-from unitcad.export.printing import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, motor_of
 from unitcad.text import cell, number
-
-SPARE_TONGUE = "spare-tongue"
 
 
 @dataclass(frozen=True)
@@ -93,7 +90,7 @@ def list_pieces(moulds: MouldSet) -> Iterator[Item]:
     """List the pieces of the tools, printed or cut."""
     lengths, plan = moulds.spec.moulds, moulds.plan
     dims, kinds = plan.dimensions, dict[str, list[Body]]()
-    for tool in plan.pieces:
+    for tool in made_pieces(moulds):
         # Tongues and filaments are numbered by cell and otherwise alike; cups and lids are not.
         kinds.setdefault(tool.kind if tool.kind in ("tongue", "filament") else tool.name, []).append(tool)
     for name, (tool, *more) in kinds.items():
@@ -110,6 +107,7 @@ def list_pieces(moulds: MouldSet) -> Iterator[Item]:
         else:
             item, made = plan.called(name), "printed upside down" if tool.upside_down else "printed as drawn"
             note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+            note += "; one is a spare" if any(piece.name == SPARE_TONGUE for piece in more) else ""
         yield Item(item, count, "piece", made, note)
 
 
@@ -174,37 +172,3 @@ def list_consumables(
         note = f"{number(size, 3)} ml, tip up to {number(tip, 3)} mm"
         yield Item("syringe", len(lidded), "piece", "bought", note)
         yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
-
-
-def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:
-    """Return the bodies of each of the printer's plates by its 3MF: `stem`.3mf, or numbered if there are several.
-
-    In their order, each on the first plate with room for it. A spare tongue, the piece that bends first, is added to
-    the tongue's plate if it has room.
-    """
-    bed_x, bed_y = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
-    filled: list[dict[Body, tuple[float, float]]] = []
-
-    def has_room(plate: dict[Body, tuple[float, float]], size: tuple[float, float]) -> bool:
-        sizes = [*plate.values(), size]
-        ends = ((x + w, y + d) for (x, y), (w, d) in zip(layout(sizes, (bed_x, bed_y)), sizes, strict=True))
-        return all(x <= bed_x and y <= bed_y for x, y in ends)
-
-    for body in bodies:
-        x0, y0, _, x1, y1, _ = extent(body.shape)
-        size = x1 - x0, y1 - y0
-        plate = next((plate for plate in filled if has_room(plate, size)), None)
-        if plate is None:
-            filled.append(plate := {})
-        plate[body] = size
-    if tongue := next((body for body in bodies if body.kind == "tongue"), None):
-        plate = next(plate for plate in filled if tongue in plate)
-        if has_room(plate, plate[tongue]):
-            plate[replace(tongue, name=SPARE_TONGUE)] = plate[tongue]
-    names = [f"{stem}-{i + 1}.3mf" for i in range(len(filled))] if len(filled) > 1 else [f"{stem}.3mf"]
-    return dict(zip(names, map(tuple, filled), strict=bool(filled)))
-
-
-def mould_plates(moulds: MouldSet) -> dict[str, tuple[Body, ...]]:
-    """Return the printed pieces of each plate by its file in a result's folder."""
-    return plates(moulds, [piece for piece in moulds.plan.pieces if piece.made == "printed"], "moulds/moulds")

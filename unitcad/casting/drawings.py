@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from unitcad.designs import layer_colour
@@ -10,7 +11,9 @@ from unitcad.moulds.base import GRIP_WIDTH, outline, plate_top
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, rotated, turned, union
+from unitcad.shape import Extrude, Revolve, Shape, box, cut, cylinder, moved, polygon, rotated, turned, union
+from unitcad.shape.extent import extent
+from unitcad.shape.tree import Body
 
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
 CARD, GREASE = (0.45, 0.72, 0.38), (0.98, 0.72, 0.16)
@@ -40,12 +43,46 @@ def cast_colour(moulds: MouldSet, pour: int) -> tuple[float, float, float]:
     return next(own, layer_colour(pour - 1))
 
 
-def arrow(way: Offset, x: float, y: float, z: float, length: float) -> Extra:
-    """Draw an arrow along a direction square to y, its middle at (x, y, z)."""
-    tip = min(3.6, length / 2)
-    upright = Revolve(polygon((0, 0), (0.55, 0), (0.55, length - tip), (1.5, length - tip), (0, length)))
+def arrow(way: Offset, x: float, y: float, z: float, length: float, thick: float = 1.0) -> Extra:
+    """Draw an arrow along a direction square to y, its middle at (x, y, z); `thick`: a factor for large scenes."""
+    tip, shaft, head = min(3.6 * thick, length / 2), 0.55 * thick, 1.5 * thick
+    upright = Revolve(polygon((0, 0), (shaft, 0), (shaft, length - tip), (head, length - tip), (0, length)))
     leaning = rotated(moved(upright, 0, 0, -length / 2), "y", math.degrees(math.atan2(way[0], way[2])))
     return Extra(moved(leaning, x, y, z), ARROW)
+
+
+def led_out(moulds: MouldSet, leads: Sequence[Body], away: float) -> tuple[Extra, ...]:
+    """Draw tail or wires led out through their slot, their inner ends with the motor `away` (z, mm) from its place."""
+    dims, fpcb, found = moulds.dimensions, moulds.spec.fpcb, list[Extra]()
+    mouth = dims.mouth_radius or dims.cavity_radius
+    for body in leads:
+        x0, y0, low, x1, y1, high = extent(body.shape)
+        if body.kind == "wire":
+            radius, y, z = (high - low) / 2, (y0 + y1) / 2, (low + high) / 2
+            bend, free = min(x0 + radius, mouth - radius), x1 + away
+            lower, upper = sorted((z, z + away))
+
+            def lying(end: float, start: float, z: float, radius: float = radius, y: float = y) -> Shape:
+                return moved(turned(cylinder(radius, start, end), "y", 1), y=y, z=z)
+
+            down = moved(cylinder(radius, lower - radius, upper + radius), bend, y)
+            parts = [lying(bend, min(x0, bend - radius), z + away), down, lying(free, bend, z)]
+        elif body.kind == "circuit" and fpcb and dims.pad:
+            half, thick = fpcb.tail_width_mm / 2, high - low
+            bend, free = min(dims.pad.radius, mouth), max(-x0, x1) + away
+            parts = list[Shape]([cylinder(dims.pad.radius, low + away, high + away)])
+            for side in dims.sides:
+                for a, b, bottom, top in (
+                    (0.0, bend, low + away, high + away),
+                    (bend - thick, bend, low + away, high),
+                    (bend - thick, free, low, high),
+                ):
+                    x0, x1 = sorted((side * a, side * b))
+                    parts.append(box(x0, x1, -half, half, bottom, top))
+        else:
+            continue
+        found.append(Extra(union(parts), body.colour))
+    return tuple(found)
 
 
 def bands(x: float, y: float, low: float, high: float) -> tuple[Extra, ...]:

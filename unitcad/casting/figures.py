@@ -46,7 +46,13 @@ MOST_ERROR_PCT = 5.0
 """Error of the ratio by the scale at which a cure begins to suffer (assumed)."""
 DATASHEET_C = 23.0
 DOUBLING_K = 10.0
-"""A cure runs twice as fast for every 10 K (assumed: the usual rule of thumb, no bulletin gives it)."""
+"""A cure runs twice as fast 10 K warmer (assumed): the lower end of van 't Hoff's rule, two to four times.
+
+J. H. van 't Hoff, Études de dynamique chimique, 1884. No bulletin of a silicone gives a factor.
+"""
+RULE_OF_THUMB = "van 't Hoff's rule of thumb, twice as fast 10 K warmer"
+OTHER_ROOM_K = 5.0
+"""Step to the colder and the warmer room whose times are written next to those of the room."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +127,21 @@ def pouring_min(cells: int) -> float:
 def at_room(value: float, room_c: float) -> float:
     """Convert a time at 23 degC (pot life, cure) to the room's temperature, by the rule of thumb above."""
     return value * 2 ** ((DATASHEET_C - room_c) / DOUBLING_K)
+
+
+def in_room(value: float, unit: str, room_c: float) -> str:
+    """Write a time of the room with its temperature: "30 min at 23 degC"."""
+    return f"{number(value, 2)} {unit} at {number(room_c, 3)} degC"
+
+
+def other_rooms(room_c: float) -> str:
+    """Say what a colder and a warmer room do to pot life and cure."""
+    colder, warmer = room_c - OTHER_ROOM_K, room_c + OTHER_ROOM_K
+    longer, shorter = (number(at_room(1.0, room) / at_room(1.0, room_c), 2) for room in (colder, warmer))
+    return (
+        f"At {number(colder, 3)} degC pot life and cure take {longer} times as long, at {number(warmer, 3)} degC "
+        f"{shorter} times ({RULE_OF_THUMB})."
+    )
 
 
 def print_min(spec: Spec, solid_mm3: float, tallest_mm: float) -> float:
@@ -241,7 +262,7 @@ class Batch:
         """All numbers of the pour with their sources."""
         casting, step, silicone, mix = self.moulds.spec.casting, self.step, self.silicone, self.mix
         cells = len(self.moulds.plan.layout.cells)
-        by_temperature = "assumed: half for every 10 K more; at 23 degC "
+        by_temperature = f"assumed: {RULE_OF_THUMB}; at {number(DATASHEET_C, 3)} degC "
         digit = f"half of {number(casting.scale_resolution_g, 3)} g"
         practice = "assumed: usual practice"
         channels = " + sprue and vents" if step.channels else ""

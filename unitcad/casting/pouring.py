@@ -9,6 +9,7 @@ from functools import partial
 from unitcad.casting.drawings import grip_of, tape_places, tongue_prop
 from unitcad.casting.figures import (
     ADHESIVE_CURE_H,
+    DATASHEET_C,
     DEGASSING_MIN,
     LAY_IN_MIN,
     LIFT_MIN,
@@ -24,14 +25,17 @@ from unitcad.casting.figures import (
     Batch,
     at_room,
     eccentricity,
+    in_room,
+    other_rooms,
     pouring_min,
     unit_heights,
     window_length,
 )
+from unitcad.casting.fittings import fittings, lead
 from unitcad.casting.steps import BenchStep
-from unitcad.casting.views import is_fed_through, picture_path, pour_picture
+from unitcad.casting.views import picture_path, pour_picture
 from unitcad.catalogue import Material
-from unitcad.designs.design import ADHESIVE, Fitting, bond
+from unitcad.designs.design import ADHESIVE
 from unitcad.moulds.cup import ribs
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST
@@ -64,14 +68,14 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
             minutes=2.0 * cells,
             required_tools=("isopropanol and lint-free wipes",),
         )
-    laid = assembly(moulds) if moulds.design.laid_in == n else ()
+    laid = fittings(moulds) if moulds.design.laid_in == n else ()
     dry = True
     for i, fitting in enumerate(laid):
         if fitting.mix and dry:
             yield from mixing_steps(batch)
             dry = False
         title = f"Lay in, {i + 1} of {len(laid)}" if len(laid) > 1 else "Lay in"
-        shown = "" if i else picture("laid-in")
+        shown = picture("laid-in") if fitting.place else ""
         yield BenchStep(title, fitting.text, shown, minutes=LAY_IN_MIN * cells, required_tools=fitting.required_tools)
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
         yield BenchStep(
@@ -279,7 +283,7 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
 
 def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
-    mix, larger = batch.mix, ""
+    mix, larger, room = batch.mix, "", batch.moulds.spec.casting.room_c
     if mix.mix_error_pct > MOST_ERROR_PCT:
         enough = number(mix.mix_g * mix.mix_error_pct / MOST_ERROR_PCT, 3)
         error = number(mix.mix_error_pct, 2)
@@ -294,7 +298,7 @@ def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
     yield BenchStep(
         "Mix",
         f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
-        f"{number(batch.pot_min, 2)} min runs from now. Keep the mixing cup.",
+        f"{in_room(batch.pot_min, 'min', room)} runs from now. {other_rooms(room)} Keep the mixing cup.",
         kind="mix",
         minutes=MIXING_MIN,
     )
@@ -356,9 +360,10 @@ def struck(
 
 def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
     """Say how long a pour cures, and how to tell that it is done."""
+    room = batch.moulds.spec.casting.room_c
     return BenchStep(
         "Cure",
-        f"Cure for {number(batch.cure_h, 2)} h, level. Then touch {touched}, not the {cast}. {TACK}.",
+        f"Cure for {in_room(batch.cure_h, 'h', room)}, level. Then touch {touched}, not the {cast}. {TACK}.",
         picture,
         kind="cure",
         wait_min=60 * batch.cure_h,
@@ -423,29 +428,30 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     """Describe how motor and circuit go in after casting; nothing if they were laid in, or there is no motor."""
     if moulds.design.laid_in or moulds.spec.motor.absent:
         return
-    fittings, casting = assembly(moulds), moulds.spec.casting
+    steps, casting = fittings(moulds), moulds.spec.casting
     later = {each.use: each for each in after_pours(moulds, silicones)}
-    for i, fitting in enumerate(fittings):
+    for i, fitting in enumerate(steps):
         if fitting.mixed:
             yield from _mixed_later(later[fitting.mixed], moulds.spec)
-        title = f"Motor in, {i + 1} of {len(fittings)}" if len(fittings) > 1 else "Motor in"
-        path = picture_path("motor-home" if i or is_fed_through(moulds) else "motor-in")
+        title = f"Motor in, {i + 1} of {len(steps)}" if len(steps) > 1 else "Motor in"
+        path = picture_path(f"motor-{fitting.place}") if fitting.place else ""
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, required_tools=fitting.required_tools)
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
-    ring = next((fitting for fitting in fittings if fitting.mixed), None)
+    up = f"the {mouth} up" if moulds.design.opens == "below" else "its skin side down"
+    ring = next((fitting for fitting in steps if fitting.mixed), None)
     if ring:
         silicone = _of_layer(silicones, ring.silicone)
         hours = at_room(float(silicone.cure_h), casting.room_c)
-        what, said = ring.mixed, f"{silicone.name} cures {number(hours, 2)} h."
-    elif any(ADHESIVE in fitting.required_tools for fitting in fittings):
+        what, said = ring.mixed, f"{silicone.name} cures {in_room(hours, 'h', casting.room_c)}."
+    elif any(ADHESIVE in fitting.required_tools for fitting in steps):
         what, hours = "adhesive", ADHESIVE_CURE_H
-        said = f"{number(hours, 2)} h, or as its tube says."
+        said = f"{in_room(hours, 'h', DATASHEET_C)}, or as its tube says."
     else:
         return
     yield BenchStep(
         f"Let the {what} cure",
-        f"{said} Lay the {moulds.makes} level, the {mouth} up; don't run the {motor} before.",
+        f"{said} Lay the {moulds.makes} level, {up}; don't run the {motor} before.",
         picture_path("motor-home"),
         kind="cure",
         wait_min=60 * hours,
@@ -464,7 +470,7 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
     yield BenchStep(
         "Fill the skin tray",
         f"Level the skin tray, fill it and draw {blade} along its rim. Prick bubbles with a pin.",
-        picture_path("skin-on"),
+        picture_path("skin-tray"),
         minutes=pouring_min(cells),
         required_tools=("level", "pin"),
     )
@@ -477,9 +483,9 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
     )
     yield BenchStep(
         "Let the skin cure",
-        f"{number(hours, 2)} h, level. Loosen the film's edge with a blunt spatula, lift the unit out, and trim the "
-        "film with small scissors.",
-        picture_path("skin-on"),
+        f"{in_room(hours, 'h', spec.casting.room_c)}, level. Loosen the film's edge with a blunt spatula, lift "
+        "the unit out, and trim the film with small scissors.",
+        picture_path("skin-cure"),
         kind="cure",
         minutes=PEEL_MIN * cells,
         wait_min=60 * hours,
@@ -496,7 +502,7 @@ def _mixed_later(mix: AfterPours, spec: Spec) -> Iterator[BenchStep]:
     yield BenchStep(
         f"Mix for the {mix.use}",
         f"Weigh {shown(mix.grams - part_b)} g of {mix.silicone.name} part A and {shown(part_b)} g of part B. "
-        f"{mixed} as for a pour; pot life {number(pot_min, 2)} min.",
+        f"{mixed} as for a pour; pot life {in_room(pot_min, 'min', spec.casting.room_c)}.",
         minutes=WEIGH_MIN + MIXING_MIN + (DEGASSING_MIN if spec.casting.vacuum else 0.0),
     )
 
@@ -504,8 +510,8 @@ def _mixed_later(mix: AfterPours, spec: Spec) -> Iterator[BenchStep]:
 def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPours]:
     """Return the silicones that are mixed after the pours, for rings round motors and for skins, one batch each."""
     cells, casting, dims = len(moulds.plan.layout.cells), moulds.spec.casting, moulds.dimensions
-    fittings = () if moulds.design.laid_in else assembly(moulds)
-    wanted = [(each.mixed, _of_layer(silicones, each.silicone), each.volume_mm3) for each in fittings if each.mixed]
+    steps = () if moulds.design.laid_in else fittings(moulds)
+    wanted = [(each.mixed, _of_layer(silicones, each.silicone), each.volume_mm3) for each in steps if each.mixed]
     if dims.skin:
         wanted.append(("skin", silicones[-1], film_mm3(moulds)))
     found = []
@@ -523,30 +529,6 @@ def film_mm3(moulds: MouldSet) -> float:
 def _of_layer(silicones: Sequence[Material], layer: int) -> Material:
     """Return the silicone of a layer (from 1, -1 the last); of one that is not there the last."""
     return silicones[min(layer, len(silicones)) - (layer > 0)]
-
-
-def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
-    """Describe how motor and circuit go into the body, or into the mould: in the design's words, if it has any."""
-    if moulds.assembly:
-        return moulds.assembly
-    spec, design, leaves = moulds.spec, moulds.design, lead(moulds)
-    found = []
-    if spec.fpcb:
-        found.append(
-            Fitting("Solder the motor to the circuit's pad, and try the motor.", ("soldering iron and solder",))
-        )
-    elif spec.wires:
-        found.append(Fitting("Try the motor on its wires."))
-    if design.laid_in:
-        return (*found, Fitting("Lay everything that is not silicone where the drawing of this pour shows it."))
-    ahead = ", the pad ahead," if spec.fpcb and design.opens == "below" else ""
-    way = f", and lay the {leaves} in the notch" if leaves else ""
-    side, what = "the skin" if design.opens == "below" else "above", "the pad" if spec.fpcb else "the motor's back"
-    return (
-        *found,
-        Fitting(f"Push the motor{ahead} into the cavity from {side}{way}."),
-        Fitting(f"{bond(what, 'Layer 1')} The design's file says no more of the assembly.", (ADHESIVE,)),
-    )
 
 
 def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> Iterator[str]:
@@ -587,11 +569,6 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
             "before."
         )
     yield f"{weighed} Less means air{low}."
-
-
-def lead(moulds: MouldSet) -> str:
-    """Return the name of the part that leads out of the silicone."""
-    return "tail" if moulds.spec.fpcb else "wires" if moulds.spec.wires else ""
 
 
 def holds(moulds: MouldSet) -> str:

@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from unitcad.casting.bill import mould_plates
 from unitcad.casting.figures import (
     BAKE_H,
     FDM_ERROR,
     MIXING_MIN,
     WEIGH_MIN,
     at_room,
+    in_room,
     print_min,
 )
+from unitcad.casting.plates import made_pieces, mould_plates
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import picture_path
 from unitcad.catalogue import Material
@@ -89,7 +90,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     `tallest_mm`: height of a piece that may be higher than core and blade.
     """
     spec, plan, lengths, resin = moulds.spec, moulds.plan, moulds.spec.moulds, in_resin(moulds)
-    printed = [tool for tool in plan.pieces if tool.made == "printed"]
+    printed = [tool for tool in made_pieces(moulds) if tool.made == "printed"]
     mixed = {tool.kind for tool in printed if not tool.upside_down}
     turned = dict.fromkeys(
         spaced(t.name.partition("-")[0]) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind
@@ -293,12 +294,14 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         wait_min=60 * BAKE_H,
         required_tools=("oven", "curing lamp"),
     )
-    drops = {each.name: at_room(float(each.cure_h), moulds.spec.casting.room_c) for each in silicones}
+    room = moulds.spec.casting.room_c
+    drops = {each.name: at_room(float(each.cure_h), room) for each in silicones}
+    each = ", ".join(f"{name} {in_room(hours, 'h', room)}" for name, hours in drops.items())
     yield BenchStep(
         "Test the cure",
         "Cure a drop of each silicone on the base, off the cavity, for its whole cure "
-        f"({', '.join(f'{name} {number(hours, 2)} h' for name, hours in drops.items())}). If its underside is tacky, "
-        "coat the pieces with acrylic varnish (assumed) or change the resin; test again.",
+        f"({each}). If its underside is tacky, coat the pieces with acrylic varnish (assumed) or "
+        "change the resin; test again.",
         kind="cure",
         minutes=WEIGH_MIN + MIXING_MIN,
         wait_min=60 * max(drops.values()),

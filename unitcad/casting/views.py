@@ -25,6 +25,7 @@ from unitcad.casting.drawings import (
     bands,
     cast_colour,
     grease_on_rim,
+    led_out,
     on_tongues,
     screwdrivers,
     tape,
@@ -32,7 +33,10 @@ from unitcad.casting.drawings import (
     tongue_prop,
 )
 from unitcad.casting.figures import window_length
+from unitcad.casting.fittings import fittings
+from unitcad.casting.plates import made_pieces
 from unitcad.designs import layer_colour
+from unitcad.designs.design import ADHESIVE
 from unitcad.export import raster
 from unitcad.export.printing import layout
 from unitcad.export.raster import Name, Surface
@@ -42,7 +46,7 @@ from unitcad.moulds.layout import MARK
 from unitcad.moulds.lid import films
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
-from unitcad.moulds.plan import Step
+from unitcad.moulds.plan import Step, place_in_cell
 from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
@@ -50,6 +54,8 @@ from unitcad.text import number
 
 ABOVE, UNDER, OVER, LOW = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6), (0.25, -1.0, 1.2), (0.55, -1.0, 0.3)
 """Directions towards the eye."""
+SINGLE, LEAST_ARROW = 25.0, 7.0
+"""Half width of a single unit's plate, for which arrows are drawn, and the least length of an arrow on it, mm."""
 Views = Iterator[tuple[str, "View"]]
 Group = Literal["moulds", "under", "pieces", "unit", "curved"]
 
@@ -102,6 +108,7 @@ def views(moulds: MouldSet) -> dict[str, View]:
 def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
     """Yield an arrow for each way in which a view moves things, in front of them."""
     moving: dict[Offset, list[tuple[float, ...]]] = {}
+    thick = max(1.0, max(moulds.plan.layout.plate) / SINGLE)
     for item in (*view.parts, *view.extras):
         if any(item.moved) and view.way:
             for shape, _ in shapes(moulds, item, view.group == "unit"):
@@ -113,7 +120,8 @@ def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
         if not dz:
             # A sliding part has it above.
             x, z = x + dx / 2, z1 + 3.0
-        yield arrow((view.way * dx, 0.0, view.way * dz), x, y0 + dy - 4.0 * (dz != 0), z, 0.6 * math.hypot(dx, dz))
+        length = max(0.6 * math.hypot(dx, dz), LEAST_ARROW * thick if thick > 1 else 0.0)
+        yield arrow((view.way * dx, 0.0, view.way * dz), x, y0 + dy - 4.0 * (dz != 0), z, length, thick)
 
 
 def shapes(moulds: MouldSet, item: Placed | Extra, unit: bool) -> list[tuple[Shape, tuple[float, float, float]]]:
@@ -124,7 +132,7 @@ def shapes(moulds: MouldSet, item: Placed | Extra, unit: bool) -> list[tuple[Sha
     if unit:
         bodies = *moulds.unit, *moulds.laid_later, *moulds.pushed_in
     else:
-        bodies = dict.fromkeys((*plan.tools, *plan.pieces, *plan.steps[-1].inserts))
+        bodies = dict.fromkeys((*plan.tools, *made_pieces(moulds), *plan.steps[-1].inserts))
     cast = [(step, shape) for step in plan.steps if step.name == item.name and not unit for shape in step.layer]
     found = [(shape, cast_colour(moulds, step.index)) for step, shape in cast]
     return found + [(body.shape, body.colour) for body in bodies if body.name == item.name]
@@ -142,7 +150,7 @@ def pour_picture(pour: int, name: str) -> str:
 
 def _views(moulds: MouldSet) -> Views:
     plan, bottom = moulds.plan, moulds.plate[0]
-    yield "pieces", View(place_pieces(plan.pieces), eye=OVER, group="pieces")
+    yield "pieces", View(place_pieces(made_pieces(moulds)), eye=OVER, group="pieces")
     if moulds.cast_flat:
         yield from _curved(moulds, moulds.cast_flat, views(moulds.cast_flat))
         return
@@ -312,34 +320,63 @@ def _demoulding(moulds: MouldSet) -> Views:
 
 def _motor_in(moulds: MouldSet) -> Views:
     """Yield the views of motor and circuit going in: a unit that opens to the skin is on its back."""
+    steps, dims = fittings(moulds), moulds.dimensions
     inside = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
     if not inside or moulds.design.laid_in:
         return
-    below = moulds.design.opens == "below"
-    away = (-1.0 if below else 1.0) * (moulds.dimensions.heights[-1] + CLEAR)
+    below, places = moulds.design.opens == "below", {fitting.place for fitting in steps}
     cast = place_pieces((body for body in moulds.unit if body.kind == "layer"), half=not moulds.laid_later)
     eye = UNDER if below else LOW
-    if not is_fed_through(moulds):
-        yield "motor-in", View((*cast, *place_pieces(inside, z=away)), (), eye, "unit", turned=below)
-    yield "motor-home", View((*cast, *place_pieces(inside)), eye=eye, group="unit", turned=below)
+
+    def view(parts: Iterable[Placed], extras: tuple[Extra, ...] = (), way: int = -1) -> View:
+        return View((*cast, *parts), extras, eye, "unit", turned=below, way=way)
+
+    away = (-1.0 if below else 1.0) * (dims.heights[-1] + CLEAR)
+    leads: tuple[Extra, ...] = ()
+    if "beside" in places:
+        # On the same bench: the body stands on its top.
+        off = dims.outer_radius + dims.motor_radius + CLEAR, 0.0, dims.heights[-1] - dims.motor_height
+        yield "motor-beside", view((Placed(body.name, off) for body in inside), way=0)
+    if "fed" in places:
+        away = -(dims.core_height + CLEAR / 2)
+        leads = led_out(moulds, inside, away)
+        inside = [body for body in inside if body.kind not in ("circuit", "wire")]
+        ends = tuple(
+            arrow((side, 0.0, 0.0), side * (dims.outer_radius + 3.0), -4.0, dims.core_height, 6.0)
+            for side in dims.sides
+        )
+        yield "motor-fed", view(place_pieces(inside, z=away), (*leads, *ends), way=0)
+    if "in" in places:
+        yield "motor-in", view(place_pieces(inside, z=away), leads)
+    if "home" in places or any(fitting.mixed or ADHESIVE in fitting.required_tools for fitting in steps):
+        whole = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
+        yield "motor-home", view(place_pieces(whole))
 
 
 def _skin_on(moulds: MouldSet) -> Views:
-    """Yield the view of the unit above the film that closes its skin side."""
-    if trays := moulds.plan.of_kind("tray"):
-        rim, colour = moulds.dimensions.heights[-1], layer_colour(len(moulds.plan.steps) - 1)
-        film = Extra(union(films(moulds.frame)), colour)
-        names = (Name("film", (moulds.plan.layout.cells[0].x, moulds.plan.layout.cells[0].y, rim), on=True),)
-        yield (
-            "skin-on",
-            View((*place_pieces(trays), *place_pieces(moulds.plan.steps, z=rim + 2 * CLEAR)), (film,), names=names),
+    """Yield the views of the film that closes the skin side: alone, under the unit, and with the unit on it."""
+    trays, plan, dims = place_pieces(moulds.plan.of_kind("tray")), moulds.plan, moulds.dimensions
+    if not trays:
+        return
+    rim, colour = dims.heights[-1], layer_colour(len(plan.steps) - 1)
+    film = Extra(union(films(moulds.frame)), colour)
+    names = (Name("film", (plan.layout.cells[0].x, plan.layout.cells[0].y, rim), on=True),)
+    inside = [body for body in moulds.unit if body.made == "bought"]
+
+    def lowered(lift: float) -> tuple[tuple[Placed, ...], tuple[Extra, ...]]:
+        """Return the units, motor and circuit in, with their skin side at z = `lift`."""
+        within = (
+            Extra(place_in_cell(body.shape, dims, cell), body.colour, (0.0, 0.0, lift))
+            for body in inside
+            for cell in plan.layout.cells
         )
+        return place_pieces(plan.steps, z=lift), tuple(within)
 
-
-def is_fed_through(moulds: MouldSet) -> bool:
-    """Tell whether a tail or wires are led out through a closed slot: no picture shows that way."""
-    exit = moulds.dimensions.exit
-    return bool(exit) and exit.high < moulds.dimensions.heights[0] and moulds.design.opens == "below"
+    yield "skin-tray", View(trays, (film,), names=names)
+    units, within = lowered(rim + 2 * CLEAR)
+    yield "skin-on", View((*trays, *units), (film, *within), names=names)
+    units, within = lowered(rim)
+    yield "skin-cure", View((*trays, *units), (film, *within), way=0)
 
 
 def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
@@ -533,7 +570,7 @@ def _laid_out(
         off = np.hypot(own[:, 0] - middle, own[:, 1] - front).round(1)
         at = own[np.lexsort((-own[:, 2], off))[0]] + by
         name = getattr(key[0], "name", "")
-        tool = next(piece for piece in plan.pieces if piece.name == name)
+        tool = next(piece for piece in made_pieces(moulds) if piece.name == name)
         filament = "straight filament" if tool.step else "filament"
         called = {"tongue": "tongue", "filament": filament}.get(tool.kind, plan.called(name))
         found.setdefault(called, []).append((float(at[0]), float(at[1]), float(at[2])))

@@ -73,9 +73,12 @@ class Tooling:
         return f"Tooling({', '.join(tool.name for tool in self.tools)})"
 
 
+Place = Literal["", "beside", "fed", "in", "home"]
+
+
 @dataclass(frozen=True)
 class Fitting:
-    """A sentence of the assembly, and the tools of its step.
+    """A sentence of the assembly, the tools of its step, and its picture.
 
     required_tools
                 tools and consumables, as casting.steps.REQUIRED_TOOLS names them
@@ -83,6 +86,8 @@ class Fitting:
     mixed       the product of that silicone, if it is mixed after the pours
     volume_mm3  the volume of it in one unit
     mix         whether it uses the mix of the pour that it is laid into
+    place       where its picture shows motor and circuit: "beside" the body; "fed": the lead is out through its slot,
+                the motor before the cavity's mouth; on their way "in"; or "home". "": it has no picture
     """
 
     text: str
@@ -91,6 +96,7 @@ class Fitting:
     mixed: Literal["", "ring"] = ""
     volume_mm3: float = 0.0
     mix: bool = False
+    place: Place = ""
 
 
 @dataclass(frozen=True)

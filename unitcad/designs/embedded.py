@@ -98,15 +98,11 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
             f"Solder the motor to the circuit's pad and try it. {bond('the pad', 'the layers')} Set the motor into the "
             f"ring, the pad on top of all layers.{hold}"
         )
-        return [Fitting(text, ("soldering iron and solder", ADHESIVE))]
-    text = (
-        "Set the motor into the ring from above."
-        if dims.mouth_radius
-        else "Push the motor in from the skin's side, its leads out at the back."
-    )
+        return [Fitting(text, ("soldering iron and solder", ADHESIVE), place="in")]
+    text = "Set the motor into the ring from above, its leads out at the back."
     if spec.wires:
         text = "Push the motor into the ring from above, the wires lying in the notch."
-    steps = [Fitting(f"{text}{hold}")]
+    steps = [Fitting(f"{text}{hold}", place="in")]
     if hold:
         return steps
     ring = (
@@ -115,7 +111,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
         "motor instead."
     )
     volume = math.pi * (dims.cavity_radius**2 - dims.motor_radius**2) * dims.motor_height
-    return [*steps, Fitting(ring, ("petroleum jelly",), silicone=1, mixed="ring", volume_mm3=volume)]
+    return [*steps, Fitting(ring, ("petroleum jelly",), silicone=1, mixed="ring", volume_mm3=volume, place="home")]
 
 
 def skipped_tooling(spec: Spec) -> list[Reason]:

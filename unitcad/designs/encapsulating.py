@@ -133,13 +133,18 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     """Write how motor and circuit, or wires, go into the cavity."""
     solder = ("soldering iron and solder",)
     if spec.wires:
-        steps = [Fitting("Feed the wires out through the slot from inside. Leave the motor before the cavity's mouth.")]
+        fed = (
+            "Lay the unit down, the cavity's mouth up. Feed the wires out through the slot from inside. Leave the "
+            "motor before the cavity's mouth."
+        )
+        steps = [Fitting(fed, place="fed")]
     elif spec.fpcb and dims.exit:
         steps = [
             Fitting(
-                "Solder the motor to the circuit's pad and try it. Feed the tail out through the slot from inside, but "
-                "leave pad and motor before the cavity's mouth.",
+                "Solder the motor to the circuit's pad and try it. Lay the unit down, the cavity's mouth up. Feed the "
+                "tail out through the slot from inside, but leave pad and motor before the cavity's mouth.",
                 solder,
+                place="fed",
             )
         ]
         strain = pad_strain(spec.fpcb, dims.exit)
@@ -150,14 +155,15 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
             )
             steps.append(Fitting(next_unit, solder))
     else:
-        steps = [Fitting("Lay the unit down with the cavity's mouth up, and the motor next to it, its back up.")]
+        laid = "Lay the unit down, the cavity's mouth up, and the motor next to it, its back up."
+        steps = [Fitting(laid, place="beside")]
     back, moved_in = ("the pad", "pad and motor") if spec.fpcb else ("the motor's back", "the motor")
     way = "through the lip" if dims.mouth_radius else "from the skin's side"
     fixed = (
         f"{bond(back, 'the cap of Layer 1')} Push {moved_in} in {way} until {back} lies against that "
         f"cap. {motor_hold(spec, dims)}"
     )
-    return [*steps, Fitting(fixed, (ADHESIVE,))]
+    return [*steps, Fitting(fixed, (ADHESIVE,), place="in")]
 
 
 DESIGN = Design(

@@ -19,7 +19,7 @@ import numpy as np
 
 from unitcad import __version__
 from unitcad.cache import digest
-from unitcad.casting.bill import SPARE_TONGUE, plates
+from unitcad.casting.plates import SPARE_TONGUE, plates
 from unitcad.casting.preparation import slicer_settings
 from unitcad.casting.procedure_text import step_section
 from unitcad.casting.views import BenchPictures, picture_path

@@ -599,7 +599,7 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
         "in the notches, and push each motor in until its pad touches that cap. The spine is free between the "
         "units."
     )
-    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, (ADHESIVE,))
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, (ADHESIVE,), place="in")
 
 
 CONSTRUCTION = Construction(
