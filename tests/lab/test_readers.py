@@ -53,6 +53,7 @@ def test_every_format_gives_the_same_columns(name, tmp_path):
         ("pyuff/time-history-not-all-columns-filled.uff", 13, "1x", "m/s²", 5e-5, -3.81956, -5.84096),
         ("nptdms/raw1.tdms", 2000, "Layer Data/First  Channel", "Volts", 2e-5, -0.184026612, 0.00091556),
         ("nptdms/raw_timestamps.tdms", 128, "Untitled/Untitled", "", 1e-3, 0.0, np.sin(2 * np.pi * 127 / 128)),
+        ("rigolwfm/DS1074Z-A.csv", 1200, "CH1", "Volt", 2e-5, 0.0, None),
         ("rigolwfm/DS1052E.csv", 8192, "Voltage", "V", None, 1.72, -0.04),
         ("soft-robotics-materials-database/Ecoflex 00-10.csv", 751, "True Strain", "", None, 0.04361, None),
     ],
@@ -66,6 +67,14 @@ def test_files_by_others_are_read(name, count, channel, unit, step_s, first, las
     assert found[0, 0] == pytest.approx(first, rel=1e-5)
     if last is not None:
         assert found[-1, 0] == pytest.approx(last, rel=2e-4)
+
+
+def test_an_oscilloscopes_index_is_not_time():
+    """Rigol's column X counts samples; its step is in the header. The other family writes time with its unit."""
+    index = open_recording(DATA / "rigolwfm" / "DS1074Z-A.csv")
+    assert index.time is None
+    assert [one.name for one in index.channels] == ["CH1", "CH2", "CH3"]
+    assert open_recording(DATA / "rigolwfm" / "DS1052E.csv").time == 0
 
 
 def test_a_name_of_two_channels_is_none():
@@ -219,10 +228,27 @@ def lvm_without_x():
     return [line if not line[0].isdigit() else "\t" + line.partition("\t")[2] for line in lines]
 
 
+def tektronix():
+    said = [["Record Length", f"{COUNT}"], ["Sample Interval", "5e-4"], ["Trigger Point", "0"], ["", ""], ["", ""]]
+    said += [["Source", "CH1"], ["Vertical Units", "V"], ["Vertical Scale", "1.0"], ["Horizontal Units", "s"]]
+    said += [["", ""]] * (COUNT - len(said))
+    return [
+        f"{a},{b},,{t},{v}," for (a, b), (t, v) in zip(said, (r.split(",") for r in rows(TIME, MOTOR)), strict=True)
+    ]
+
+
+def clock(date=""):
+    stamps = [f"{date}09:59:{59 + t:09.6f}" if t < 1 else "" for t in TIME]
+    return ["time,motor (V)", *(f"{stamp},{v:.6f}" for stamp, v in zip(stamps, MOTOR, strict=True))]
+
+
 LAYOUTS = {
     "empty first line": ["", "Time,motor", "(ms),(V)", "", *rows(1e3 * TIME, MOTOR)],
     "labview": lvm(),
     "labview without x": lvm_without_x(),
+    "tektronix": tektronix(),
+    "clock": clock(),
+    "date and clock": clock("2024-05-01 "),
     "second alone": ["Second,Volt", *rows(TIME, MOTOR)],
     "words": ["Time (s),State,motor (V)", *(f"{t:.6f},OK,{v:.6f}" for t, v in zip(TIME, MOTOR, strict=True))],
     "comments": [

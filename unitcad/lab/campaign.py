@@ -11,7 +11,8 @@ from msgspec import Meta
 from unitcad.catalogue.entries import between
 from unitcad.errors import Refusal
 from unitcad.files import path_seen_from, sha256
-from unitcad.lab.readers import Quantity, expect_ending, to_si
+from unitcad.lab.readers import expect_ending
+from unitcad.lab.units import Quantity, to_si
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
 from unitcad.validation.load import load_file

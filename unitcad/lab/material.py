@@ -16,11 +16,10 @@ from scipy.stats import t
 from unitcad import files
 from unitcad.catalogue import Material
 from unitcad.errors import Refusal, UnitcadError, unknown_name
-from unitcad.lab.readers import AS_FOUND, COLUMN_UNITS, Layout, Recording, open_recording, plain
+from unitcad.lab.readers import AS_FOUND, Layout, Recording, open_recording
+from unitcad.lab.units import COLUMN_UNITS, plain
 from unitcad.text import some
 
-_ANY_CASE = ("lbf", "kgf", "kN", "kPa", "psi", "in", "in/in", "Hz")
-"""Units that mean one thing in any case: none has a prefix whose other case is another one."""
 _COLUMN_NAMES = {
     "time": r"(?:test )?time|(?:prüf)?zeit|时间",
     "strain": r"(?:(?:engineering|eng\.?|nominal|tensile) )?strain|dehnung|应变",
@@ -80,10 +79,10 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
             limit = f"{recording.path.name} has several columns for {quantity}: {names}; declare {quantity}=COLUMN:UNIT"
             raise Refusal("--column", None, limit)
         at = fitting[0]
-    unit = unit or channels[at].unit
+    unit, doubt = unit or channels[at].unit, channels[at].doubt
     factor = _unit(unit, quantity) if unit else 1.0 if quantity in _BARE else None
     if factor is None:
-        said = f"has the unit {unit!r}" if unit else "has no unit"
+        said = f"has the unit {unit!r}" if unit else f"has no clear unit ({doubt})" if doubt else "has no unit"
         limit = f"{recording.path.name}: column {at + 1} ({channels[at].name}) {said}; declare {quantity}={at + 1}:UNIT"
         units = ", ".join(COLUMN_UNITS[quantity])
         raise Refusal(
@@ -118,12 +117,8 @@ def read_columns(
 
 
 def _unit(text: str, quantity: str) -> float | None:
-    known, written = COLUMN_UNITS[quantity], plain(text)
-    if (factor := known.get(text.strip(), known.get(written))) is not None:
-        return factor
-    # Only the case may differ, unless it tells prefixes apart: mN and MN, mm and Mm are two units.
-    alike = [unit for unit in known if unit.lower() == written.lower()]
-    return known[alike[0]] if len(alike) == 1 and alike[0] in _ANY_CASE else None
+    known = COLUMN_UNITS[quantity]
+    return known.get(text.strip(), known.get(plain(text)))
 
 
 LEAST_POINTS = 5

@@ -28,7 +28,8 @@ from unitcad.lab.material import (
     read_curve,
     read_dynamic,
 )
-from unitcad.lab.readers import COLUMN_UNITS, Layout
+from unitcad.lab.readers import Layout
+from unitcad.lab.units import COLUMN_UNITS
 from unitcad.rooms import expect_none_but
 from unitcad.spec import convert, read_toml
 from unitcad.text import some, toml, toml_key

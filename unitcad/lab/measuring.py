@@ -18,7 +18,8 @@ from scipy.stats import t
 
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, check_files
-from unitcad.lab.record import LabFinding, RecordResult, finding, measure_record
+from unitcad.lab.record import LabFinding, RecordResult, assumed_unit, finding, measure_record
+from unitcad.text import some
 
 COVERAGE = 0.95
 LEAST_REPEATS = 3
@@ -28,6 +29,10 @@ NEAR_MOTOR = 0.2
 """Part of the motor's frequency, to either side, in which a unit's line is looked for."""
 MOST_APART = 0.1
 """Part of the motor's frequency by which the unit's may differ: beyond, it is another motor's."""
+LEVELS = (1e-4, 3.0)
+"""A level beyond these is that of a wrong unit: measured levels are 0.04 to 1, and prefixes differ by 1000."""
+MOST_BETWEEN_REPEATS = 10.0
+"""Factor between repeats beyond which they are not of one place, or not in the units that they are read in."""
 
 
 @dataclass(frozen=True)
@@ -102,12 +107,49 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     findings: list[LabFinding] = []
     for unit in campaign.unit:
         records[unit.name] = tuple(one := _records(unit, campaign, folder, say))
+        _expect_units_stated(campaign, [record for several in records.values() for record in several])
         findings += [finding for record in one for finding in record.findings]
         for role, distance, _ in sorted(_places(unit), key=itemgetter(1)):
             more, said = _levels(unit, role, distance, one, campaign)
             levels += more
             findings += said
     return Measured(campaign, tuple(levels), records, tuple(findings))
+
+
+def _expect_units_stated(campaign: Campaign, records: Sequence[RecordResult]) -> None:
+    """Raise Refusal if some files of one sensor state a unit, and others, read in another unit, none."""
+    own_motor = campaign.motor_sensor is not None
+    for key, sensor in (("sensor", campaign.sensor), ("motor_sensor", campaign.motor_sensor)):
+        if sensor is None or sensor.per is not None:
+            continue
+        read = [
+            (record.file, unit)
+            for record in records
+            for i, unit in enumerate(record.units)
+            if own_motor is False or (key == "motor_sensor") == (record.role == "reference" or i == 1)
+        ]
+        silent = next((file for file, unit in read if not unit.stated), None)
+        other = next(((file, unit) for file, unit in read if unit.stated and unit.name != assumed_unit(sensor)), None)
+        if silent and other:
+            limit = f"is needed: {other[0]} states {other[1].name}, and {silent} no unit: is it in {other[1].name}?"
+            raise Refusal(f"{key}.per", None, limit, assumed_unit(sensor))
+
+
+def _units(records: Sequence[RecordResult], channel: int = 0) -> str:
+    """Return the units in which the records' numbers were read, with the files if they differ."""
+    by_unit: dict[str, list[str]] = {}
+    for record in records:
+        by_unit.setdefault(str(record.units[channel]), []).append(record.file)
+    return ", ".join(f"{unit}: {some(names, 3)}" if len(by_unit) > 1 else unit for unit, names in by_unit.items())
+
+
+def _apart(where: str, values: Sequence[float], records: Sequence[RecordResult]) -> LabFinding | None:
+    """Return the finding that repeats differ too much for a level, if they do."""
+    factor = max(values) / min(values)
+    if factor <= MOST_BETWEEN_REPEATS:
+        return None
+    message = f"repeats differ by a factor of {factor:.3g}, read in {_units(records)}"
+    return finding("L109", where, message, "error")
 
 
 def _places(unit: UnitTable) -> list[tuple[str, float, tuple[str, ...]]]:
@@ -167,7 +209,15 @@ def _levels(
             message = f"{count} usable records; a level needs {LEAST_REPEATS}"
             findings.append(finding("L112", f"{where}, {hertz:.2f} Hz, by {chain}", message))
             continue
+        sides = ((where, values, near), (f"{unit.name}, motor", below, base))[: 1 if paired else 2]
+        if doubt := next((one for name, each, side in sides if (one := _apart(name, each, side))), None):
+            findings.append(doubt)
+            continue
         result = level(values, None if paired else below)
+        if not LEVELS[0] <= result.value <= LEVELS[1]:
+            read = f"read in {_units(near)} at the place and {_units(near, 1) if paired else _units(base)} at the motor"
+            limit = f"is the level by {chain}; it must be from {LEVELS[0]:g} to {LEVELS[1]:g}. Is a unit wrong? {read}"
+            raise Refusal(where, float(f"{result.value:.4g}"), limit)
         levels.append(PlaceLevel(unit.name, distance, chain, result, hertz))
         if result.scatter > MOST_DISAGREEMENT:
             message = f"by {chain}: logarithms scatter by {result.scatter:.2f}"

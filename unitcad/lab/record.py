@@ -15,7 +15,8 @@ from unitcad.geometry.arrays import Floats
 from unitcad.lab import bandpass
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable
 from unitcad.lab.line import LineFit, clip_level, fit_line, spectrum
-from unitcad.lab.readers import TIME_NAMES, UNITS, Layout, Recording, open_recording, plain, ratio, seconds, to_si
+from unitcad.lab.readers import TIME_NAMES, Channel, Layout, Recording, open_recording
+from unitcad.lab.units import UNITS, is_signal_unit, plain, ratio, seconds, to_si
 from unitcad.meshcheck.rules.registry import Rule
 
 RULES = {
@@ -51,8 +52,9 @@ RULES = {
             The steady part is too short to know the noise next to the line. Example: 0.1 s at
             125 Hz. Fix: Record 2 s.""",
             """L109 warning: repeats disagree
-            The repeats' logarithms scatter by more than 0.15. Example: A unit that was not taped down
-            again as before. Fix: Repeat, five times or more.""",
+            The repeats' logarithms scatter by more than 0.15. Beyond a factor of ten between repeats it is an error:
+            no level is given. Example: A unit that was not taped down again as before; a file in another unit.
+            Fix: Repeat, five times or more; compare the units of the files.""",
             """L110 error: drop-outs
             More than a tenth of the samples were excluded: more than a robust fit bears. Example: A
             vibrometer on bare skin, a motor that runs for less than half of the record. Fix: Put retroreflective
@@ -114,11 +116,22 @@ HIGHEST_RATE = 5_000.0
 
 
 @dataclass(frozen=True)
+class Unit:
+    """The unit in which a channel's numbers were read, and whether the file states it."""
+
+    name: str
+    stated: bool
+
+    def __str__(self) -> str:
+        return self.name if self.stated else f"{self.name} (not stated)"
+
+
+@dataclass(frozen=True)
 class Signal:
     """A record's samples (n, channels) at `rate` in Hz: means of `averaged` neighbours of the file's at `raw_rate`.
 
     `count` and `missing`: samples of the file, and of each channel those that are no numbers; `off_grid`: the largest
-    distance of a time from an even grid, in steps.
+    distance of a time from an even grid, in steps. `units`: of each channel, as read.
     """
 
     samples: Floats
@@ -127,6 +140,7 @@ class Signal:
     count: int
     missing: tuple[int, ...]
     off_grid: float
+    units: tuple[Unit, ...]
 
     @property
     def rate(self) -> float:
@@ -162,10 +176,15 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
             column = others[0]
         columns.append(column)
     rate, stamps = _rate(recording, table, time, columns[0], shown)
+    keys = ("sensor", "motor_sensor" if sensors[1:] and sensors[1] is not sensors[0] else "sensor")
     factors = [
-        _factor(sensor, plain(channels[column].unit), f"{shown}, {channels[column].name}")
-        for column, sensor in zip(columns, sensors, strict=True)
+        _factor(sensor, channels[column], key, f"{shown}, {channels[column].name}")
+        for column, sensor, key in zip(columns, sensors, keys, strict=False)
     ]
+    units = tuple(
+        Unit(plain(channel.unit), True) if channel.unit and not channel.doubt else Unit(assumed_unit(sensor), False)
+        for channel, sensor in zip((channels[column] for column in columns), sensors, strict=False)
+    )
     samples = recording.columns(columns)
     count, missing = len(samples), tuple(int(n) for n in np.count_nonzero(~np.isfinite(samples), axis=0))
     off_grid = 0.0 if stamps is None else _off_grid(stamps, rate)
@@ -175,7 +194,7 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     averaged = max(min(int(rate / HIGHEST_RATE), count), 1)
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
-    return Signal(samples, rate, averaged, count, missing, off_grid)
+    return Signal(samples, rate, averaged, count, missing, off_grid, units)
 
 
 def _off_grid(stamps: Floats, rate: float) -> float:
@@ -184,29 +203,41 @@ def _off_grid(stamps: Floats, rate: float) -> float:
     return float(off.max()) if np.isfinite(off).all() else np.inf
 
 
-def _factor(sensor: SensorTable, own: str, shown: str) -> float:
-    """Return the factor from numbers of a file to the sensor's unit; `own` is their unit, "" if the file gives none.
+def assumed_unit(sensor: SensorTable) -> str:
+    """Return the unit of numbers of which the file states none."""
+    return plain(sensor.per or ("V" if sensor.scale != 1.0 else sensor.unit))
 
-    Raises Refusal for a unit that doesn't fit the sensor's, and for a scale that may be per one unit or another.
+
+def _factor(sensor: SensorTable, channel: Channel, key: str, shown: str) -> float:
+    """Return the factor from numbers of a channel to the sensor's unit; `key` is the sensor's in the campaign.
+
+    Raises Refusal for a unit that is not clear or doesn't fit the sensor's, and for a scale that may be per one unit or
+    another.
     """
-    per = plain(sensor.per) if sensor.per else ""
-    if not own or own == per:
+    own, per, assumed = plain(channel.unit), plain(sensor.per or ""), assumed_unit(sensor)
+    if channel.doubt and not per and channel.likely != assumed:
+        limit = f"is needed, the unit of the numbers: {shown}: {channel.doubt}"
+        raise Refusal(f"{key}.per", None, limit, channel.likely or None)
+    if channel.doubt or not own or own == per:
         return sensor.scale
     if per:
         if (factor := ratio(own, per)) is None:
-            raise Refusal("sensor.per", sensor.per, f"but {shown}, says {own}", own)
+            raise Refusal(f"{key}.per", sensor.per, f"but {shown}, says {own}", own)
         return sensor.scale * factor
     if own in UNITS[sensor.quantity]:
         if sensor.scale != 1.0:
-            limit = f"{shown}, says {own}, which needs no scale; for a gain, set sensor.per = {own!r}"
-            raise Refusal("sensor.scale", sensor.scale, limit, 1.0)
+            limit = f"{shown}, says {own}, which needs no scale; for a gain, set {key}.per = {own!r}"
+            raise Refusal(f"{key}.scale", sensor.scale, limit, 1.0)
         return ratio(own, plain(sensor.unit)) or 1.0
+    if not is_signal_unit(own):
+        limit = f"is needed, the unit of the numbers: {shown}, says {channel.unit!r}, which is no unit of a signal that"
+        raise Refusal(f"{key}.per", None, f"{limit} unitcad knows", channel.unit)
     if sensor.scale == 1.0:
-        limit = f"but {shown}, says {own}: declare sensor.scale and sensor.per, or another quantity"
-        raise Refusal("sensor.unit", sensor.unit, limit)
+        limit = f"but {shown}, says {own}: declare {key}.scale and {key}.per, or another quantity"
+        raise Refusal(f"{key}.unit", sensor.unit, limit)
     if ratio(own, "V") not in (None, 1.0):
         limit = f"is needed: {shown}, says {own}; is the scale per {own} or per V?"
-        raise Refusal("sensor.per", None, limit, "V")
+        raise Refusal(f"{key}.per", None, limit, "V")
     return sensor.scale
 
 
@@ -275,7 +306,8 @@ class RecordResult:
 
     `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, or its ratio to
     the motor's own channel, without the chains that the record is not fit for; `bandpass_gain` the gain of the filters
-    at the line, None without that chain; `picture` the samples and the spectrum, in the sensor's unit.
+    at the line, None without that chain; `picture` the samples and the spectrum, in the sensor's unit. `units`: of the
+    file's numbers, by channel.
     """
 
     file: str
@@ -284,6 +316,7 @@ class RecordResult:
     rate_hz: float
     samples: int
     unit: str
+    units: tuple[Unit, ...]
     picture: tuple[Floats, Floats, Floats, Floats]
     findings: tuple[LabFinding, ...]
     usable: bool = False
@@ -309,6 +342,7 @@ class RecordResult:
         data |= {} if self.frequency_hz else {"amplitude_um": None}
         data |= {
             "length_s": self.length_s,
+            "units_in_file": list(map(str, self.units)),
             "by_chain": self.by_chain,
             "findings": [one.as_dict() for one in self.findings],
         }
@@ -345,7 +379,7 @@ def measure_record(
             severity = "error" if gaps > MOST_MASKED * signal.count else "warning"
             findings.append(finding("L119", where, message, severity))
     unit = sensors[0].unit
-    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, picture, ())
+    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, signal.units, picture, ())
     if any(one.code == "L101" for one in findings):
         return replace(none, findings=tuple(findings))
     fits = _fits(samples, rate, band, campaign.chain.mains_hz)

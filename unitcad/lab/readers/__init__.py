@@ -6,97 +6,22 @@ import contextlib
 import functools
 import os
 import pkgutil
-import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from unitcad import files
-from unitcad.errors import Refusal, UnitcadError, missing_extra, unknown_name
+from unitcad.errors import Refusal, UnitcadError, missing_extra
 from unitcad.geometry.arrays import Floats
+from unitcad.lab.units import TIMES, in_name, plain
 from unitcad.text import some
 from unitcad.workers import Pool, TimedOut, WorkerEnded
-
-Quantity = Literal["displacement", "velocity", "acceleration"]
-
-GRAVITY = 9.80665
-"""m/s2, the standard acceleration of free fall (CGPM 1901)."""
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254}
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-UNITS: dict[str, dict[str, float]] = {
-    "displacement": LENGTHS,
-    "velocity": {f"{name}/s": factor for name, factor in LENGTHS.items()},
-    "acceleration": {**{f"{name}/s2": factor for name, factor in LENGTHS.items()}, "g": GRAVITY},
-}
-"""Factors to m, m/s and m/s2, by quantity and unit."""
-ELECTRICAL = (
-    {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "kV": 1e3},
-    {"A": 1.0, "mA": 1e-3, "uA": 1e-6},
-    {"C": 1.0, "nC": 1e-9, "pC": 1e-12},
-)
-"""Factors between units of a sensor's output: voltage, current, charge."""
-_OTHER = ("rad", "deg", "degC", "°C", "mm/min")
-_WORDS = {"volt": "V", "volts": "V", "sec": "s", "second": "s", "seconds": "s", "metre": "m", "meter": "m"}
-
-
-def plain(unit: str) -> str:
-    """Return a unit as this program spells it: um for both signs of micro, m/s2 for m/s² and m/s^2."""
-    text = unit.strip().strip("[]()").strip()
-    text = text.replace("µ", "u").replace("μ", "u").replace("²", "2").replace("^", "").replace("**", "")
-    text = re.sub(r"/s/s\b|/sec2\b|/sec\^2", "/s2", text.replace(" ", ""))
-    return _WORDS.get(text.lower(), text)
-
-
-def is_known_unit(unit: str) -> bool:
-    """Tell whether a text is a unit that this program knows by name."""
-    name = plain(unit)
-    return name in _OTHER or (
-        name != "1" and any(name in units for units in (TIMES, *ELECTRICAL, *UNITS.values(), *COLUMN_UNITS.values()))
-    )
-
-
-def ratio(unit: str, other: str) -> float | None:
-    """Return how many of the second unit one of the first is; None if they measure different quantities."""
-    both = next((units for units in (*ELECTRICAL, *UNITS.values()) if unit in units and other in units), None)
-    return both[unit] / both[other] if both else 1.0 if unit == other else None
-
-
-def to_si(unit: str, quantity: Quantity, field: str) -> float:
-    """Return the factor from a unit to m, m/s or m/s2. Raises Refusal for a unit of another quantity."""
-    units = UNITS[quantity]
-    if plain(unit) not in units:
-        raise unknown_name(field, unit, units)
-    return units[plain(unit)]
-
-
-def seconds(unit: str, field: str) -> float:
-    """Return the factor from a unit of time to s. Raises Refusal for any other unit."""
-    if plain(unit) not in TIMES:
-        raise Refusal(field, unit, f"is no unit of time; known: {', '.join(TIMES)}", "s")
-    return TIMES[plain(unit)]
-
-
-_PRESSURE = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "psi": 6894.757293168}
-_STRAIN = {"1": 1.0, "%": 1e-2, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "-": 1.0}
-COLUMN_UNITS: Mapping[str, Mapping[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
-    "strain": _STRAIN,
-    "stress": _PRESSURE,
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": 4.4482216152605, "gf": 9.80665e-3, "kgf": 9.80665},
-    "travel": {"mm": 1e-3, "um": 1e-6, "cm": 1e-2, "m": 1.0, "in": 0.0254},
-    "frequency": {"Hz": 1.0, "rad/s": 1.0 / (2.0 * np.pi)},
-    "storage": _PRESSURE,
-    "loss": _PRESSURE,
-    "tan_delta": {"1": 1.0, "-": 1.0},
-}
-"""Factors to SI by quantity and unit; frequency to Hz."""
-
 
 LARGEST = 250_000_000
 """Bytes of a file that is read: all formats are read whole."""
@@ -134,12 +59,17 @@ AS_FOUND = Layout()
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel: its samples, its name, its unit ("" if the file gives none), its step in s if known."""
+    """One channel: its samples, its name, its unit ("" if the file gives none), its step in s if known.
+
+    `doubt`: why the file's unit is not clear, "" if it is; `likely`: the unit that it then may be.
+    """
 
     samples: Any
     name: str
     unit: str = ""
     step_s: float | None = None
+    doubt: str = ""
+    likely: str = ""
 
 
 @dataclass(frozen=True)
@@ -263,7 +193,18 @@ def _read(module: str, path: Path, layout: Layout) -> list[Channel]:
     found = import_module(f"{__name__}.{module}").read(path, layout)
     if not found:
         raise Unreadable(str(path), None, "has no channel of numbers")
-    return found
+    return [_with_name(channel) for channel in found]
+
+
+def _with_name(channel: Channel) -> Channel:
+    """Return a channel with the unit that its name states, or the doubt if its file states another one."""
+    _, by_name = in_name(channel.name)
+    if not channel.unit and not channel.doubt:
+        return replace(channel, unit=by_name.unit, doubt=by_name.doubt, likely=by_name.likely)
+    if channel.unit and by_name.unit and plain(channel.unit) != plain(by_name.unit):
+        doubt = f"its name says {by_name.unit}, and its file {channel.unit}"
+        return replace(channel, unit="", doubt=doubt, likely=plain(channel.unit))
+    return channel
 
 
 @functools.cache

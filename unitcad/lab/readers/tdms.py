@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from unitcad.lab.readers import Channel, Layout, Unreadable
+from unitcad.lab.units import Scope, stated
 
 ENDINGS = (".tdms",)
 LIBRARY = "nptdms"
@@ -27,10 +28,14 @@ def read(path: Path, layout: Layout) -> list[Channel]:
         for channel in everything:
             if not (isinstance(channel.dtype, np.dtype) and channel.dtype.kind in "fiu" and len(channel)):
                 continue
-            step, unit = channel.properties.get("wf_increment"), channel.properties.get("unit_string")
+            step = channel.properties.get("wf_increment")
             known = isinstance(step, float | int) and np.isfinite(step) and step > 0
+            scopes = [
+                Scope("its properties", channel.properties),
+                Scope("its group's properties", file[channel.group_name].properties, (channel.name,)),
+                Scope("the file's properties", file.properties, (channel.name,)),
+            ]
+            (unit,) = stated(scopes)
             name = f"{channel.group_name}/{channel.name}"
-            found.append(
-                Channel(channel[:], name, unit if isinstance(unit, str) else "", float(step) if known else None)
-            )
+            found.append(Channel(channel[:], name, unit.unit, float(step) if known else None, unit.doubt, unit.likely))
     return found

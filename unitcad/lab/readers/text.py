@@ -6,7 +6,6 @@ numbers are skipped. An empty cell, and the sign that an instrument writes for a
 
 from __future__ import annotations
 
-import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,9 @@ import numpy as np
 
 from unitcad import files
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.readers import Channel, Layout, Unreadable, is_known_unit
+from unitcad.lab.header import beside, quoted, read_header
+from unitcad.lab.readers import Channel, Layout, Unreadable
+from unitcad.lab.units import Stated
 
 ENDINGS = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")
 HEAD = 1_000_000
@@ -23,12 +24,11 @@ HEAD = 1_000_000
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[nN][aA][nN]", re.ASCII)
 _OVER_RANGE = re.compile(r"[+-]?(?:∞|inf(?:inity)?|f{4,}|-{3,}|\*{3,}|#{3,})", re.ASCII | re.IGNORECASE)
 """Signs for a value beyond the range: of PicoScope, Keyence, and spreadsheets."""
+_CLOCK = re.compile(r"(?:\d[\d/.-]*[ T])?(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)", re.ASCII)
+"""A time of day, perhaps after a date."""
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?(?:[eE][+-]?\d+)?", re.ASCII)
 _DIALECTS = (("\t", "."), (";", "."), (",", "."), (" ", "."), ("\t", ","), (";", ","), (" ", ","), (",", ","))
 """Delimiter and decimal sign; the same sign for both only if quotes separate them."""
-_UNIT_ALONE = re.compile(r"[\[(][^\[\]()]*[\])]")
-_NAMED_UNIT = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*")
-_END_OF_HEADER = "***End_of_Header***"
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Block:
             fields = [re.sub(r'^"(.*)"$', r"\1", field) for field in line.split()]
         else:
             line = line.strip(" ").removesuffix(self.delimiter)
-            fields = _quoted(line, self.delimiter) if '"' in line else line.split(self.delimiter)
+            fields = quoted(line, self.delimiter) if '"' in line else line.split(self.delimiter)
             fields = [field.strip() for field in fields or line.split(self.delimiter)]
         if self.decimal == ",":  # each sign becomes the other one
             fields = [field.translate(_SWAPPED) for field in fields]
@@ -80,17 +80,19 @@ _SWAPPED = str.maketrans(",.", ".,")
 
 
 def _is_number(field: str) -> bool:
-    return any(kind.fullmatch(field) for kind in (_NUMBER, _OVER_RANGE))
+    return any(kind.fullmatch(field) for kind in (_NUMBER, _OVER_RANGE, _CLOCK))
 
 
 def _value(field: str) -> float:
     """Return the number in a field; NaN for an empty one and for the sign of a value beyond the range."""
+    if clock := _CLOCK.fullmatch(field):
+        return 3600 * float(clock[1]) + 60 * float(clock[2]) + float(clock[3])
     return float(field) if _NUMBER.fullmatch(field) else np.nan
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the columns of a text file. Raises Unreadable if it has no block of numbers, or an ambiguous one."""
-    lines = _text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = beside(_text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n"))
     sizes = np.cumsum([len(line) + 1 for line in lines])
     head = lines[: max(int(np.searchsorted(sizes, HEAD)), 1)] if sizes[-1] > HEAD else lines
     block = _block(path, head, layout)
@@ -101,9 +103,15 @@ def read(path: Path, layout: Layout) -> list[Channel]:
             limit = f"{path.name}: line {i + 1} ({line.strip()[:40]!r}) looks like data, but the block begins at line "
             raise Unreadable("skip_lines", None, f"{limit}{block.start + 1}; correct the file, or skip that line")
     rows = _rows(path, lines, block)
-    names, units, step = _header(lines[layout.skip_lines : block.start] or lines[: block.start], block)
-    shown = [i for i, kind in enumerate(block.kinds) if kind == "n"]
-    return [Channel(rows[:, i], names[i] or f"column {i + 1}", units[i], step) for i in shown]
+    header = read_header(lines[layout.skip_lines : block.start] or lines[: block.start], block.delimiter, block.width)
+    clocks = [bool(_CLOCK.fullmatch(field)) for field in block.row(lines[block.start], block.width)[0]]
+    shown = [i for i, kind in enumerate(block.kinds) if kind == "n" and not (header.index and i == 0)]
+    units = [Stated("s") if clock else one for clock, one in zip(clocks, header.units, strict=True)]
+    return [
+        Channel(rows[:, i], header.names[i] or f"column {i + 1}", one.unit, header.step_s, one.doubt, one.likely)
+        for i in shown
+        for one in [units[i]]
+    ]
 
 
 def _text(path: Path) -> str:
@@ -125,14 +133,6 @@ def _text(path: Path) -> str:
     return content.decode("latin-1")
 
 
-def _quoted(line: str, delimiter: str, strict: bool = True) -> list[str]:
-    """Return the fields of a line with quotes; none if one is not closed."""
-    try:
-        return next(csv.reader([line], delimiter=delimiter, strict=strict, skipinitialspace=strict), [])
-    except csv.Error:
-        return []
-
-
 def _block(path: Path, lines: list[str], layout: Layout) -> Block:
     """Return the longest run of lines of the same columns, over all delimiters that may be meant."""
     runs = []
@@ -149,8 +149,8 @@ def _block(path: Path, lines: list[str], layout: Layout) -> Block:
     if best is None or best.lines < 2:
         raise Unreadable(str(path), None, "needs two lines or more of the same count of numbers")
     if not layout.decimal:
-        quoted = [_quoted(line.strip(" "), best.delimiter) for line in lines[best.start :] if '"' in line]
-        fields = [field.strip() for line in quoted for field in line if "," in field]
+        in_quotes = [quoted(line.strip(" "), best.delimiter) for line in lines[best.start :] if '"' in line]
+        fields = [field.strip() for line in in_quotes for field in line if "," in field]
         if fields and all(_THOUSANDS.fullmatch(field) and "." not in field for field in fields):
             limit = f"{path.name}: the comma in {fields[0]!r} may be a decimal sign or part thousands; declare decimal"
             raise Unreadable("decimal", None, limit)
@@ -212,44 +212,3 @@ def _rows(path: Path, lines: list[str], block: Block) -> Floats:
             limit = f"line {i + 1} ({line.strip()[:40]!r}) does not have {block.width} numbers as those above"
             raise Unreadable(str(path), None, limit)
     return np.array(rows, float)
-
-
-def _header(header: list[str], block: Block) -> tuple[list[str], list[str], float | None]:
-    """Return the columns' names and units by the last lines of the header, and the step that it may state, in s."""
-    rows = [_words(line, block.delimiter) for line in header if line.strip()]
-    names, units = [""] * block.width, [""] * block.width
-    if any(row[:1] == [_END_OF_HEADER] for row in rows):
-        return _lvm_header(rows, block.width)
-    # A line of more names than columns says not which column each one names.
-    rows = [row for row in rows[-2:] if len(row) == block.width]
-    if not rows:
-        return names, units, None
-    last = rows[-1]
-    alone = [bool(_UNIT_ALONE.fullmatch(word)) for word in last]
-    units_row = any(last) and all(is_known_unit(word) or a for word, a in zip(last, alone, strict=True) if word)
-    if units_row or all(alone):
-        names = rows[0] if len(rows) == 2 else [word.strip("[]() ") for word in last]
-        names = [""] * block.width if len(rows) == 1 and all(alone) else names
-        units = [word.strip("[]() ") if is_known_unit(word) or a else "" for word, a in zip(last, alone, strict=True)]
-    elif not any(alone):  # a unit by itself among names: its spaces have split them
-        for i, word in enumerate(last):
-            parts = _NAMED_UNIT.fullmatch(word)
-            names[i], units[i] = (parts[1] or word, parts[2]) if parts else (word, "")
-    return names, units, None
-
-
-def _lvm_header(rows: list[list[str]], width: int) -> tuple[list[str], list[str], float | None]:
-    """Return names, units and step of a LabVIEW file, which has a value for each channel next to each key."""
-    keys = {row[0]: [*row[1:], *[""] * width] for row in rows}
-    units = ["s" if keys.get("X_Dimension", [""])[0] in ("", "Time") else "", *keys.get("Y_Unit_Label", [""] * width)]
-    step = keys.get("Delta_X", [""])[0].replace(",", ".")
-    names = rows[-1] if rows[-1][0] == "X_Value" else []
-    rising = float(step) if _NUMBER.fullmatch(step) else 0.0
-    return [*names, *[""] * width][:width], units[:width], rising if rising > 0 else None
-
-
-def _words(line: str, delimiter: str) -> list[str]:
-    line = re.sub(r"^[#%]+ *(?=[^\s,;])", "", line.strip(" "))  # the sign of a comment, not of a percentage
-    if delimiter == " ":
-        return line.split()
-    return [word.strip() for word in _quoted(line.rstrip().removesuffix(delimiter), delimiter, strict=False)]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.io import wavfile
 
+from unitcad.lab.header import units_in_lines
 from unitcad.lab.readers import Channel, Layout, Unreadable
+from unitcad.lab.units import Stated, text_of
 
 ENDINGS = (".wav",)
 LIBRARY = "scipy"
@@ -25,8 +28,31 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     data = data.reshape(len(data), -1)
     if rate <= 0 or len(data) < 2:
         raise Unreadable(str(path), None, "has no samples, or states no rate")
-    unit = ""
+    units = units_in_lines(_remarks(content), data.shape[1])
     if data.dtype.kind in "iu":  # parts of the largest number
-        unit, small = "FS", data.dtype == np.uint8
+        small = data.dtype == np.uint8
         data = (data - (128.0 if small else 0.0)) / (128.0 if small else 2.0 ** (8 * data.dtype.itemsize - 1))
-    return [Channel(data[:, i], f"channel {i + 1}", unit, 1 / rate) for i in range(data.shape[1])]
+        whole = "its numbers are parts of full scale, and its remarks say"
+        units = [Stated(doubt=f"{whole} {one.unit}") if one.unit else Stated("FS", one.doubt) for one in units]
+    return [
+        Channel(data[:, i], f"channel {i + 1}", one.unit, 1 / rate, one.doubt, one.likely)
+        for i, one in enumerate(units)
+    ]
+
+
+def _remarks(content: bytes) -> list[str]:
+    """Return the lines of the texts in a WAV file's LIST chunks of remarks (INFO)."""
+    order: Literal["little", "big"] = "big" if content.startswith(b"RIFX") else "little"
+    lines: list[str] = []
+    at = 12
+    while at + 8 <= len(content):
+        size = int.from_bytes(content[at + 4 : at + 8], order)
+        if content[at : at + 4] == b"LIST" and content[at + 8 : at + 12] == b"INFO":
+            inner, end = at + 12, min(at + 8 + size, len(content))
+            while inner + 8 <= end:
+                length = int.from_bytes(content[inner + 4 : inner + 8], order)
+                text = content[inner + 8 : min(inner + 8 + length, end)]
+                lines += str(text_of(text)).splitlines()
+                inner += 8 + length + length % 2
+        at += 8 + size + size % 2
+    return lines
