@@ -21,7 +21,8 @@ from unitcad.sweeps.executors import open_executor
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Summary
-from unitcad.sweeps.run import BatchOptions, Watch, count_variants, run, trim
+from unitcad.sweeps.run import BatchOptions, Watch, indices_of, run, trim
+from unitcad.sweeps.shard import shard_of
 from unitcad.sweeps.sweep import Sweep, load_sweep
 from unitcad.validation import Changes
 from unitcad.validation.plain_data import changes_of
@@ -37,11 +38,12 @@ def preview(sweep: Sweep, options: BatchOptions) -> dict[str, Any]:
     Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError if all are.
     """
     only = check_outputs(options.only)
-    count = count_variants(sweep, options.limit)
+    indices = indices_of(sweep, options)
+    count = len(indices)
     looked = min(count, LOOKED_AT)
     geometries: set[str] = set()
     refused: list[dict[str, Any]] = []
-    for index in range(looked):
+    for index in indices[:looked]:
         try:
             variant = subject(sweep.spec(index))
         except UnitcadError as error:
@@ -132,6 +134,7 @@ def batch(
     limit: int | None = None,
     timeout: float | None = None,
     keep_going: bool = False,
+    shard: str | None = None,
     cache: str | os.PathLike[str] | None = None,
     report: bool = False,
 ) -> BatchResult:
@@ -153,6 +156,8 @@ def batch(
         Time limit for a variant, s.
     keep_going : bool, default False
         Continue after a variant that fails.
+    shard : str, optional
+        Part of the sweep to make, such as "3/16". All parts take the same folder; the last one completes the tables.
     cache : path, optional
         Folder of the cache. Default: the user's.
     report : bool, default False
@@ -182,7 +187,8 @@ def batch(
     wanted = chosen.overridden({**changes_of(set), **own})
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
-    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where)
+    part = None if shard is None else shard_of(shard)
+    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where, shard=part)
     summary = make(wanted, folder, options, jobs)
     if report:
         write_report(folder)

@@ -35,6 +35,7 @@ from unitcad.sweeps import load_sweep
 from unitcad.sweeps.batch_call import make, preview
 from unitcad.sweeps.journal import JournalEntry, Summary
 from unitcad.sweeps.run import BatchOptions, Watch
+from unitcad.sweeps.shard import shard_of
 
 
 @contextlib.contextmanager
@@ -110,6 +111,13 @@ def batch(
             metavar="SECONDS", min=0.001, max=1e7, callback=finite, help="Time limit for a variant. Default: none."
         ),
     ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            metavar="I/N",
+            help="Make part I of N, for job arrays; every part takes the same folder. Default: all variants.",
+        ),
+    ] = None,
     limit: Annotated[
         int | None, typer.Option(metavar="N", help="Make only the first N variants. Default: all.")
     ] = None,
@@ -145,9 +153,10 @@ def batch(
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
+    part = None if shard is None else shard_of(shard)
     if page is None:
-        page = only is None and scheduler is None and wanted.count <= PAGE_UP_TO
-    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
+        page = only is None and scheduler is None and part is None and wanted.count <= PAGE_UP_TO
+    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, part)
     if dry_run:
         size = preview(wanted, options)
         print_json(size) if as_json or json_lines else _print_preview(size)
@@ -161,7 +170,7 @@ def batch(
     except KeyboardInterrupt:
         typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
         sys.exit(130)
-    if page or (folder / PAGE).is_file():  # one that is there is kept up
+    if page or (part is None and (folder / PAGE).is_file()):  # one that is there is kept up
         with progress(folder.name) as say:
             say("page")
             write_report(folder, warn)

@@ -13,7 +13,7 @@ from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.journal import Journal, JournalEntry, Summary
-from unitcad.sweeps.run import BatchOptions, Watch, batch_head, count_entry, count_variants, finish
+from unitcad.sweeps.run import BatchOptions, Watch, batch_head, count_entry, finish, indices_of
 from unitcad.sweeps.sweep import Sweep
 
 
@@ -25,11 +25,11 @@ def write_estimates(
     Variants that an earlier run in `out` finished are not evaluated again. Raises UnitcadError for a folder that isn't
     ours.
     """
-    count = count_variants(sweep, options.limit)
     head = batch_head(sweep, ("estimate",), options)
-    summary, start = Summary(count), time.perf_counter()
-    with Journal(out, head) as journal:
-        for index in range(count):
+    indices = indices_of(sweep, options)
+    summary, start = Summary(len(indices)), time.perf_counter()
+    with Journal(out, head, options.shard) as journal:
+        for index in indices:
             entry = journal.entry(index)
             summary.resumed += entry is not None
             if entry is None:
@@ -37,7 +37,7 @@ def write_estimates(
                 journal.add(entry)
             count_entry(summary, entry.status, lambda entry=entry: entry)
             watch(summary, JournalEntry(index, entry.status, entry.reason))
-        finish(sweep, journal, head, summary, start, 1)
+        finish(sweep, journal, head, options, summary, start, 1)
     watch(summary, None)
     return summary
 

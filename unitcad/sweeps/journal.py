@@ -1,7 +1,10 @@
 """The record of finished variants: one line a variant, appended as it ends, so that a kill loses nothing.
 
-<out>/batch.lock      locked while a batch runs: a second one in the same folder is refused
-<out>/journal.jsonl   a head that says which batch this is, then a line a finished variant; the last one counts
+<out>/batch.lock                locked while a batch runs: a second one in the same folder is refused
+<out>/journal.jsonl             a head that says which batch this is, then a line a finished variant; the last one counts
+<out>/batch-3-of-16.lock        the same of a shard; shards of one batch run at the same time
+<out>/journal-3-of-16.jsonl
+<out>/merge.lock                locked while a shard merges the journals
 
 Each line ends with a checksum over itself and over the batch's identity. unitcad skips damaged lines and those of
 another batch, and checks their variants again.
@@ -22,6 +25,7 @@ from msgspec import Struct, ValidationError, convert, field, structs, to_builtin
 from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.plan import code_version
+from unitcad.sweeps.shard import Shard
 
 Values = dict[str, Any]
 """Values of one variant by dotted path of the spec, or by column of the table."""
@@ -86,24 +90,29 @@ class Summary(Struct):
     warnings: list[str] = []
 
 
-JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
+JOURNAL, LOCK, MERGE, TABLE = "journal.jsonl", "batch.lock", "merge.lock", "batch.json"
+_OF_SHARD = "-*-of-*"
 
 
 class Journal:
-    """The journal of one output folder, open and locked; `damaged` counts the skipped lines.
+    """The journal of one output folder or of a shard in it, open and locked; `damaged` counts the skipped lines.
 
-    Raises UnitcadError for a folder that isn't ours, that has another batch, or in which a batch is running.
+    It begins with the lines of every journal in the folder. A shard that ends opens it to `merge`: the shard's own lock
+    then keeps a batch out. Raises UnitcadError for a folder that isn't ours, that has another batch, or in which a batch
+    is running.
     """
 
-    def __init__(self, out: Path, head: BatchHead) -> None:
+    def __init__(self, out: Path, head: BatchHead, shard: Shard | None = None, *, merge: bool = False) -> None:
         self.out = out
         self.head = {**to_builtins(head), "code": code_version()}
         self._seed = zlib.crc32(_text(self.head))
         self._starts: dict[int, int] = {}  # of each variant's last line
         self.damaged = 0
-        self._lock = _lock(out, head)
+        self._lock = _lock(out, head, shard, merge)
         try:
-            self._file = self._open(out / JOURNAL)
+            self._file = self._open(out / named(JOURNAL, shard))
+            if not shard and not merge:
+                self._absorb()
         except BaseException:
             self._lock.release()
             raise
@@ -148,18 +157,25 @@ class Journal:
         return _entry(self._file.readline(), self._seed)
 
     def _open(self, path: Path) -> IO[bytes]:
-        """Write the journal's file anew with the whole lines of an earlier run of this batch, and open it."""
-        earlier = self._earlier(path) if path.exists() else iter(())
+        """Write the journal's file anew with the whole lines of this batch in all journals, and open it."""
+        whole, shards = path.with_name(JOURNAL), _of_shards(path)
+        earlier = [whole, *(shard for shard in shards if shard != path), *([path] if path != whole else [])]
         with files.writing(path, sync=True) as file:
             file.write(_pack(self.head, 0))
-            for line in earlier:
-                entry = _entry(line, self._seed)
-                if entry is None:
-                    self.damaged += 1
-                    continue
-                self._starts[entry.index] = file.tell()
-                file.write(line)
+            for journal in earlier:  # the last line of a variant counts
+                for line in self._earlier(journal) if os.path.lexists(journal) else ():
+                    entry = _entry(line, self._seed)
+                    if entry is not None:
+                        self._starts[entry.index] = file.tell()
+                        file.write(line)
+                    elif journal == path:  # another shard may be at its last line
+                        self.damaged += 1
         return open(path, "ab+")
+
+    def _absorb(self) -> None:
+        """Remove the journals of shards, whose lines this one has."""
+        for shard in _of_shards(self.out / JOURNAL):
+            shard.unlink(missing_ok=True)
 
     def _earlier(self, path: Path) -> Iterator[bytes]:
         """Yield the lines below the head of a journal of this batch; none of those of other code.
@@ -229,16 +245,34 @@ def _another(out: Path, name: str) -> UnitcadError:
     )
 
 
-def _lock(out: Path, head: BatchHead) -> FileLock:
-    lock = FileLock(out / LOCK, blocking=False, thread_local=False)
+def named(name: str, shard: Shard | None) -> str:
+    """Return the name of a file of the whole batch or of a shard: "journal-3-of-16.jsonl"."""
+    stem, dot, ending = name.partition(".")
+    return f"{stem}-{shard}{dot}{ending}" if shard else name
+
+
+def _of_shards(path: Path) -> list[Path]:
+    """Return the files of all shards next to `path`, by their names."""
+    stem, dot, ending = (JOURNAL if path.name.endswith(".jsonl") else LOCK).partition(".")
+    return sorted(path.parent.glob(f"{stem}{_OF_SHARD}{dot}{ending}"))
+
+
+def _lock(out: Path, head: BatchHead, shard: Shard | None, merge: bool) -> FileLock:
+    lock = FileLock(out / (MERGE if merge else named(LOCK, shard)), blocking=merge, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        if not (out / JOURNAL).exists():
+        if not (out / JOURNAL).exists() and not _of_shards(out / JOURNAL):
             _check_free(out, head)
         lock.acquire()
+        # A batch and a shard each take their own lock first, so that at least one of them sees the other.
+        running = [] if merge else [out / LOCK] if shard else _of_shards(out / LOCK)
+        for other in running:
+            with FileLock(other, blocking=False, thread_local=False):
+                pass
     except (FileExistsError, NotADirectoryError):
         raise files.in_the_way(out) from None
     except Timeout:
+        lock.release()
         raise UnitcadError(
             f"{out}: another batch is running in this folder; wait for it or choose another with -o"
         ) from None
@@ -249,9 +283,10 @@ def _lock(out: Path, head: BatchHead) -> FileLock:
 
 def _check_free(out: Path, head: BatchHead) -> None:
     """Refuse a folder that is not empty and has no journal, unless its table names this batch."""
-    if all(path.name == LOCK for path in out.iterdir()):
+    locks = {LOCK, MERGE, *(path.name for path in _of_shards(out / LOCK))}
+    if all(path.name in locks for path in out.iterdir()):
         return
-    if not (out / LOCK).exists():
+    if not any((out / lock).exists() for lock in locks):
         raise UnitcadError(f"{out}: has files that are no batch's result; choose another folder with -o")
     try:
         there = files.read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)

@@ -34,12 +34,12 @@ def write_results(
     _write_json(out / JSON, {**to_builtins(head), **levels, "columns": columns}, entries())
 
 
-def write_timings(out: Path, summary: Summary, workers: int) -> None:
+def write_timings(path: Path, summary: Summary, workers: int) -> None:
     """Write the counts and times of this run, which differ between runs."""
     timings = {key: value for key, value in to_builtins(summary).items() if key not in ("failures", "warnings")}
     fresh = summary.done - summary.resumed
     timings["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
-    files.write(out / "timings.json", (json.dumps({"workers": workers, **timings}, indent=1) + "\n").encode())
+    files.write(path, (json.dumps({"workers": workers, **timings}, indent=1) + "\n").encode())
 
 
 def columns_of(sweep: Sweep, journal: Journal) -> list[str]:

@@ -26,8 +26,9 @@ from unitcad.spec.raw import OUTPUTS
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
-from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary
+from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary, named
 from unitcad.sweeps.results import columns_of, write_results, write_timings
+from unitcad.sweeps.shard import Shard
 from unitcad.sweeps.sweep import MOST, Sweep
 from unitcad.sweeps.task import Job, Task
 from unitcad.workers import WorkerEnded
@@ -50,7 +51,7 @@ class BatchOptions:
     """Options of a run.
 
     `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
-    of finished variants, not only their sizes.
+    of finished variants, not only their sizes; `shard` is the part to make, None for all.
     """
 
     only: Sequence[str] = OUTPUTS
@@ -61,6 +62,7 @@ class BatchOptions:
     cache: Path | None = None
     cache_mb: float = DEFAULT_LIMIT_MB
     verify: bool = False
+    shard: Shard | None = None
 
 
 def run(
@@ -81,12 +83,12 @@ def run(
     outcome of each variant.
     """
     head = batch_head(sweep, check_outputs(options.only), options)
-    count = count_variants(sweep, options.limit)
-    summary = Summary(count)
+    indices = indices_of(sweep, options)
+    summary = Summary(len(indices))
     cache = DiskStore(options.cache or default_root())
     shared = None if remote and options.cache is None else cache.root.absolute()
-    journal = Journal(out, head)
-    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, shared, summary)
+    journal = Journal(out, head, options.shard)
+    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, shared, summary, indices)
     if journal.damaged:
         summary.warnings.append(
             f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
@@ -96,7 +98,7 @@ def run(
         clear_leftovers(out)
         batch.all()
         clear_leftovers(out)  # of workers that ended in the middle of their task
-        finish(sweep, journal, head, summary, start, workers)
+        finish(sweep, journal, head, options, summary, start, workers)
         watch(summary, None)
     except OSError as error:
         reason = tasks.failure(0, error).reason
@@ -113,13 +115,19 @@ def run(
     return summary
 
 
-def finish(sweep: Sweep, journal: Journal, head: BatchHead, summary: Summary, start: float, workers: int) -> None:
-    """Write the tables of a batch that is whole in its journal, and its times since `start`. Raises OSError."""
-    found = swept_estimate(sweep, summary.variants) if "estimate" in head.outputs else None
+def finish(
+    sweep: Sweep, own: Journal, head: BatchHead, options: BatchOptions, summary: Summary, start: float, workers: int
+) -> None:
+    """Write the tables of a batch from its journal, and its times since `start`. Raises OSError.
+
+    Those of a shard have the finished variants of all shards.
+    """
+    found = swept_estimate(sweep, count_variants(sweep, options.limit)) if "estimate" in head.outputs else None
     summary.warnings += insensitive_warnings(found)
-    write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found)
+    with Journal(own.out, head, merge=True) if options.shard else contextlib.nullcontext(own) as journal:
+        write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found)
     summary.seconds = round(time.perf_counter() - start, 3)
-    write_timings(journal.out, summary, workers)
+    write_timings(own.out / named("timings.json", options.shard), summary, workers)
 
 
 def trim(options: BatchOptions) -> None:
@@ -151,6 +159,12 @@ def count_variants(sweep: Sweep, limit: int | None) -> int:
     return min(sweep.count, limit or sweep.count)
 
 
+def indices_of(sweep: Sweep, options: BatchOptions) -> range:
+    """Return the indices of the variants to make. Raises Refusal as `count_variants`."""
+    count = count_variants(sweep, options.limit)
+    return options.shard.indices(count) if options.shard else range(count)
+
+
 class _Batch:
     """One run of one sweep; at most `room` tasks are submitted at a time.
 
@@ -159,10 +173,11 @@ class _Batch:
 
     def __init__(
         self, sweep: Sweep, options: BatchOptions, executor: Executor, room: int,
-        watch: Watch, journal: Journal, cache: Path | None, summary: Summary,
+        watch: Watch, journal: Journal, cache: Path | None, summary: Summary, indices: range,
     ) -> None:  # fmt: skip
         self.sweep, self.options, self.executor, self.room = sweep, options, executor, room
         self.watch, self.journal, self.cache, self.summary = watch, journal, cache, summary
+        self.indices = indices
         self.only = check_outputs(options.only)
         self.coming = self._to_make()
         self.groups: dict[str, deque[Job]] = {}
@@ -190,7 +205,7 @@ class _Batch:
         Variants that failed before come last: a batch that stops at a failure has made all others by then.
         """
         failed: list[int] = []
-        for index in range(self.summary.variants):
+        for index in self.indices:
             entry = self.journal.entry(index)
             if entry is not None and self._stands(entry):
                 self._finished(JournalEntry(index, entry.status), fresh=False)
