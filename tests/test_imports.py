@@ -284,7 +284,7 @@ def test_a_room_can_be_deleted(gone, tmp_path):
 def test_the_core_needs_no_extra():
     """Every public name, and the module of every command, loads without the packages of the extras."""
     extras = ("build123d", "cadquery", "OCP", "skfem", "threadpoolctl", "libdlf", "pyuff", "nptdms", "h5py", "ezdxf")
-    extras += ("starlette", "uvicorn", "tomlkit", "distributed", "dask", "fsspec", "s3fs", "pyarrow")
+    extras += ("starlette", "uvicorn", "tomlkit", "distributed", "dask", "obstore", "pyarrow")
     code = (
         f"import sys\nfor name in {extras}: sys.modules[name] = None\n"
         "import unitcad\nfrom unitcad.rooms import commands, load\n"

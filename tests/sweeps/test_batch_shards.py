@@ -17,7 +17,11 @@ from unitcad.sweeps.shard import Shard, shard_of
 
 def results(out):
     """The bytes of the variants and of the tables; journals and locks are the run's own."""
-    return {path: sha for path, sha in bytes_of(out).items() if not path.startswith(("journal", "batch-", "timings", "merge"))}
+    return {
+        path: sha
+        for path, sha in bytes_of(out).items()
+        if not path.startswith(("journal", "batch-", "timings", "merge"))
+    }
 
 
 @pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 1000])

@@ -21,6 +21,7 @@ from unitcad.sweeps.executors import open_executor
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Summary
+from unitcad.sweeps.object_store import is_address
 from unitcad.sweeps.run import BatchOptions, Watch, indices_of, run, trim
 from unitcad.sweeps.shard import shard_of
 from unitcad.sweeps.sweep import Sweep, load_sweep
@@ -102,6 +103,13 @@ _MOST_ROWS = 20
 """Variants that a notebook's cell lists."""
 
 
+def place(sweep: Sweep, out: str | None) -> tuple[Path, str | None]:
+    """Return the folder of a batch's journal and tables, and the address of the store of its variants, if it has one."""
+    if out is not None and not is_address(out):
+        return Path(out), None
+    return Path("out") / sweep.slug, out
+
+
 def make(
     sweep: Sweep,
     folder: Path,
@@ -144,8 +152,9 @@ def batch(
     ----------
     sweep : str, path or Sweep
         A file, or the name of a shipped sweep.
-    out : path, optional
-        Folder of the batch. Default: out/<name>.
+    out : path or str, optional
+        Folder of the batch, or ``"s3://bucket/prefix"`` for the variants of workers that share no disk; the tables are
+        then in the default folder too. Default: out/<name>.
     set, formats, only, check
         As for `unitcad.build`; they apply to every variant.
     jobs : int, optional
@@ -185,10 +194,12 @@ def batch(
     chosen = sweep if isinstance(sweep, Sweep) else load_sweep(path("sweep", sweep))
     own = {} if formats is None else {"output.formats": texts("formats", formats)}
     wanted = chosen.overridden({**changes_of(set), **own})
-    folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
+    folder, store = place(wanted, None if out is None else path("out", out))
     where = None if cache is None else Path(path("cache", cache))
     part = None if shard is None else shard_of(shard)
-    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where, shard=part)
+    options = BatchOptions(
+        tuple(texts("only", only)), check, keep_going, timeout, limit, where, shard=part, store=store
+    )
     summary = make(wanted, folder, options, jobs)
     if report:
         write_report(folder)

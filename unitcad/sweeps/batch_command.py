@@ -32,8 +32,9 @@ from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.batch_call import make, preview
+from unitcad.sweeps.batch_call import make, place, preview
 from unitcad.sweeps.journal import JournalEntry, Summary
+from unitcad.sweeps.object_store import is_address
 from unitcad.sweeps.run import BatchOptions, Watch
 from unitcad.sweeps.shard import shard_of
 
@@ -85,8 +86,14 @@ def batch(
         typer.Argument(metavar="SWEEP", help="Sweep file, or name of a shipped one (unitcad list sweeps)."),
     ],
     out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", metavar="DIR", help="Folder of the batch. Default: out/NAME-OF-THE-SWEEP."),
+        str | None,
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="DIR",
+            help="Folder of the batch, or s3://BUCKET/PREFIX for workers that share no disk. "
+            "Default: out/NAME-OF-THE-SWEEP.",
+        ),
     ] = None,
     jobs: Annotated[
         int | None,
@@ -155,34 +162,38 @@ def batch(
     allow_code(code, nothing_else=dry_run)
     part = None if shard is None else shard_of(shard)
     if page is None:
-        page = only is None and scheduler is None and part is None and wanted.count <= PAGE_UP_TO
-    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, part)
+        page = (
+            only is None and scheduler is None and part is None and not is_address(out) and wanted.count <= PAGE_UP_TO
+        )
+    folder, store = place(wanted, out)
+    if store and chosen == ("estimate",):
+        raise Refusal("-o", store, "estimates only are one table: name a folder")
+    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, part, store)
     if dry_run:
         size = preview(wanted, options)
         print_json(size) if as_json or json_lines else _print_preview(size)
         return
     if chosen == ("estimate",) and scheduler is not None:
         raise Refusal("--scheduler", scheduler, "estimates only are computed in this process: leave it out")
-    folder = out or Path("out") / wanted.slug
     try:
         with watching(json_lines) as watch:
             summary = make(wanted, folder, options, jobs, scheduler, watch)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
+        typer.echo(f"interrupted: finished variants stay in {store or folder}; the same command resumes", err=True)
         sys.exit(130)
     if page or (part is None and (folder / PAGE).is_file()):  # one that is there is kept up
         with progress(folder.name) as say:
             say("page")
             write_report(folder, warn)
     if as_json:
-        print_json({"folder": str(folder), **to_builtins(summary)})
+        print_json({"folder": str(folder), **({"store": store} if store else {}), **to_builtins(summary)})
     elif not json_lines:
-        _print_summary(summary, folder)
+        _print_summary(summary, folder, store)
     if summary.failed or summary.stopped:
         sys.exit(1)
 
 
-def _print_summary(summary: Summary, folder: Path) -> None:
+def _print_summary(summary: Summary, folder: Path, store: str | None) -> None:
 
     for warning in summary.warnings:
         warn(f"warning: {warning}")
@@ -205,7 +216,7 @@ def _print_summary(summary: Summary, folder: Path) -> None:
     typer.echo("; ".join(parts))
     there = (folder / PAGE).is_file()
     typer.echo(f"open {folder / PAGE}" if there else f"unitcad report {shlex.quote(str(folder))} writes its page")
-    typer.echo(str(folder))
+    typer.echo(store or str(folder))
 
 
 def _print_preview(size: Mapping[str, Any]) -> None:

@@ -103,14 +103,14 @@ class Journal:
     """
 
     def __init__(self, out: Path, head: BatchHead, shard: Shard | None = None, *, merge: bool = False) -> None:
-        self.out = out
+        self.out, self.path = out, out / of_shard(JOURNAL, shard)
         self.head = {**to_builtins(head), "code": code_version()}
         self._seed = zlib.crc32(_text(self.head))
         self._starts: dict[int, int] = {}  # of each variant's last line
         self.damaged = 0
         self._lock = _lock(out, head, shard, merge)
         try:
-            self._file = self._open(out / named(JOURNAL, shard))
+            self._file = self._open(self.path)
             if not shard and not merge:
                 self._absorb()
         except BaseException:
@@ -245,7 +245,7 @@ def _another(out: Path, name: str) -> UnitcadError:
     )
 
 
-def named(name: str, shard: Shard | None) -> str:
+def of_shard(name: str, shard: Shard | None) -> str:
     """Return the name of a file of the whole batch or of a shard: "journal-3-of-16.jsonl"."""
     stem, dot, ending = name.partition(".")
     return f"{stem}-{shard}{dot}{ending}" if shard else name
@@ -258,7 +258,7 @@ def _of_shards(path: Path) -> list[Path]:
 
 
 def _lock(out: Path, head: BatchHead, shard: Shard | None, merge: bool) -> FileLock:
-    lock = FileLock(out / (MERGE if merge else named(LOCK, shard)), blocking=merge, thread_local=False)
+    lock = FileLock(out / (MERGE if merge else of_shard(LOCK, shard)), blocking=merge, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not (out / JOURNAL).exists() and not _of_shards(out / JOURNAL):

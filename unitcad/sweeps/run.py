@@ -22,11 +22,13 @@ from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.plan import check_outputs, kernel_versions
 from unitcad.pipeline.subjects import subject
 from unitcad.pipeline.write import clear_leftovers, whole
+from unitcad.report.read_results import CSV
 from unitcad.spec.raw import OUTPUTS
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
-from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary, named
+from unitcad.sweeps.journal import JOURNAL, TABLE, BatchHead, Failure, Journal, JournalEntry, Summary, of_shard
+from unitcad.sweeps.object_store import object_store
 from unitcad.sweeps.results import columns_of, write_results, write_timings
 from unitcad.sweeps.shard import Shard
 from unitcad.sweeps.sweep import MOST, Sweep
@@ -51,7 +53,8 @@ class BatchOptions:
     """Options of a run.
 
     `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
-    of finished variants, not only their sizes; `shard` is the part to make, None for all.
+    of finished variants, not only their sizes; `shard` is the part to make, None for all; `store` is the address of an
+    object store for the variants, which otherwise are folders next to the tables.
     """
 
     only: Sequence[str] = OUTPUTS
@@ -63,6 +66,7 @@ class BatchOptions:
     cache_mb: float = DEFAULT_LIMIT_MB
     verify: bool = False
     shard: Shard | None = None
+    store: str | None = None
 
 
 def run(
@@ -78,15 +82,19 @@ def run(
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
     `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers may be on other
-    machines, which share the disk of `out`; their cache is their own, unless the options name one. Variants that an
+    machines; these share the disk of `out`, unless the options name a store. Their cache is their own, unless the options
+    name one. Variants that an
     earlier run in `out` finished are not made again. Raises UnitcadError if nothing can be run; the summary has the
     outcome of each variant.
     """
     head = batch_head(sweep, check_outputs(options.only), options)
     indices = indices_of(sweep, options)
     summary = Summary(len(indices))
+    store = object_store(options.store) if options.store else None
     cache = DiskStore(options.cache or default_root())
     shared = None if remote and options.cache is None else cache.root.absolute()
+    if store:
+        store.fetch(out, "journal*.jsonl")
     journal = Journal(out, head, options.shard)
     batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, shared, summary, indices)
     if journal.damaged:
@@ -96,9 +104,13 @@ def run(
     start = time.perf_counter()
     try:
         clear_leftovers(out)
+        if store:
+            store.put_files([journal.path])  # refuses before the work
         batch.all()
         clear_leftovers(out)  # of workers that ended in the middle of their task
         finish(sweep, journal, head, options, summary, start, workers)
+        if store:
+            store.put_files([journal.path, out / CSV, out / TABLE])
         watch(summary, None)
     except OSError as error:
         reason = tasks.failure(0, error).reason
@@ -127,7 +139,7 @@ def finish(
     with Journal(own.out, head, merge=True) if options.shard else contextlib.nullcontext(own) as journal:
         write_results(journal.out, columns_of(sweep, journal), journal.entries, head, found)
     summary.seconds = round(time.perf_counter() - start, 3)
-    write_timings(own.out / named("timings.json", options.shard), summary, workers)
+    write_timings(own.out / of_shard("timings.json", options.shard), summary, workers)
 
 
 def trim(options: BatchOptions) -> None:
@@ -219,7 +231,11 @@ class _Batch:
     def _stands(self, entry: JournalEntry) -> bool:
         """Check whether the folder of a variant that was made is still there and whole."""
         folder, verify = self.journal.out / entry.folder, self.options.verify
-        if entry.status not in (tasks.OK, tasks.BROKEN) or whole(folder, hashes=verify) is None:
+        if entry.status not in (tasks.OK, tasks.BROKEN):
+            return False
+        if self.options.store:
+            return object_store(self.options.store).has(entry.folder, manifest=entry.manifest, verify=verify)
+        if whole(folder, hashes=verify) is None:
             return False
         return not verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 
@@ -258,7 +274,8 @@ class _Batch:
             if chosen is None:
                 return
             key, jobs = chosen
-            out, options = self.journal.out.absolute(), self.options
+            options = self.options
+            out = options.store or self.journal.out.absolute()
             task = Task(tuple(jobs), key, self.only, options.check, options.timeout, out, self.cache)
             self.running[self.executor.submit(tasks.work, task)] = task
 
@@ -326,10 +343,10 @@ class _Batch:
             self.again.append((key, job))
             return
         self.tried.discard(outcome.index)
-        if outcome.folder and not (self.journal.out / outcome.folder).is_dir():
+        if outcome.folder and not self.options.store and not (self.journal.out / outcome.folder).is_dir():
             raise UnitcadError(
                 f"{self.journal.out}: the workers' results are not in this folder: they have a disk of their own; "
-                "choose a folder on a disk that they and this machine share with -o"
+                "choose with -o a folder on a disk that they and this machine share, or s3://bucket/prefix"
             )
         self._finished(outcome)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass, field
@@ -22,6 +23,7 @@ from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.subjects import subject_of_text
 from unitcad.spec import custom_code
 from unitcad.sweeps.journal import JournalEntry
+from unitcad.sweeps.object_store import ObjectStore, object_store
 from unitcad.workers import limit
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
@@ -44,7 +46,7 @@ class Job:
 class Task:
     """Variants of one geometry, made into folders in `out`; without `cache` by the cache of the worker's user.
 
-    `allowed` is the code that the caller may run, and so may the worker.
+    An `out` of an object store is its address. `allowed` is the code that the caller may run, and so may the worker.
     """
 
     jobs: tuple[Job, ...]
@@ -52,7 +54,7 @@ class Task:
     only: tuple[str, ...]
     check: bool
     timeout: float | None
-    out: Path
+    out: Path | str
     cache: Path | None
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=custom_code.allowed)
@@ -63,21 +65,41 @@ def work(task: Task) -> list[JournalEntry]:
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
+    if isinstance(task.out, str):
+        return _work_apart(task, object_store(task.out))
+    return _work(task, task.out)
+
+
+def _work(task: Task, out: Path) -> list[JournalEntry]:
+    """Make a task's variants into folders in `out`."""
     try:
-        with files.scratch(task.out) as scratch:
-            done = [_timed(job, task, scratch) for job in task.jobs]
+        with files.scratch(out) as scratch:
+            done = [_timed(job, task, out, scratch) for job in task.jobs]
     except OSError as error:
         return [failure(job.index, error) for job in task.jobs]
-    folders.sync(task.out / outcome.folder for outcome in done if outcome.folder)
+    folders.sync(out / outcome.folder for outcome in done if outcome.folder)
     return done
 
 
-def _timed(job: Job, task: Task, scratch: Path) -> JournalEntry:
+def _work_apart(task: Task, store: ObjectStore) -> list[JournalEntry]:
+    """Make a task's variants on this worker's own disk, and put them into the store."""
+    with tempfile.TemporaryDirectory(prefix="unitcad-") as out:
+        done = _work(task, Path(out))
+        for i, outcome in enumerate(done):
+            if outcome.folder:
+                try:
+                    store.put_folder(Path(out, outcome.folder))
+                except UnitcadError as error:
+                    done[i] = failure(outcome.index, error)
+    return done
+
+
+def _timed(job: Job, task: Task, out: Path, scratch: Path) -> JournalEntry:
     """Make a variant within the task's time; an error is its outcome."""
     start = time.perf_counter()
     try:
         with limit(task.timeout):
-            outcome = _make(job, task, scratch)
+            outcome = _make(job, task, out, scratch)
     except Exception as error:
         outcome = failure(job.index, error)
     return structs.replace(outcome, seconds=time.perf_counter() - start)
@@ -93,10 +115,10 @@ def failure(index: int, error: BaseException) -> JournalEntry:
     return JournalEntry(index, FAILED, " ".join(text.split()))
 
 
-def _make(job: Job, task: Task, scratch: Path) -> JournalEntry:
-    """Make a variant into its folder in `task.out`."""
+def _make(job: Job, task: Task, out: Path, scratch: Path) -> JournalEntry:
+    """Make a variant into its folder in `out`."""
     spec = subject_of_text(job.spec)
-    folder = task.out / spec.folder_name
+    folder = out / spec.folder_name
     manifest = _finished_manifest(folder, spec, task, job.damaged)
     if manifest is not None:
         sha256, reused = _manifest_sha256(folder), True
