@@ -261,7 +261,9 @@ class Elsewhere(SerialExecutor):
 def test_results_on_the_disk_of_another_machine_are_not_taken_for_kept(tmp_path):
     sweep, out = load_sweep(ring_sweep(tmp_path / "s", heights=[2.0], materials=2)), tmp_path / "out"
     (tmp_path / "elsewhere").mkdir()
-    with pytest.raises(UnitcadError, match="have a disk of their own; choose a folder on a disk that they and this"):
+    with pytest.raises(
+        UnitcadError, match="have a disk of their own; choose with -o a folder on a disk that they and this"
+    ):
         run(sweep, out, BatchOptions(("unit",)), Elsewhere(), workers=1, remote=True)
     assert (out / "journal.jsonl").read_text().count("\n") == 1  # its head alone
     assert run(sweep, out, BatchOptions(("unit",)), SerialExecutor(), workers=1, remote=True).ok == 2
