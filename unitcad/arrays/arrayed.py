@@ -60,6 +60,7 @@ from unitcad.pipeline.manifest import (
     count_findings,
     printed_mm3,
 )
+from unitcad.pipeline.optional import UNMADE, OptionalFiles
 from unitcad.pipeline.plan import (
     OUTPUTS,
     begun,
@@ -139,11 +140,14 @@ class Arrayed(Compound):
         steps: list[PourRecord] = []
         made: Procedure | None = None
         drawn: list[str] = []
-        if "pdf" in self.formats and "moulds" in only:
-            own[DRAWING] = drawing(moulds, ("moulds",))
+        optional = OptionalFiles()
+        drawn_tools = "pdf" in self.formats and "moulds" in only
+        if drawn_tools and (page := optional.made(DRAWING, lambda: drawing(moulds, ("moulds",)))):
+            own[DRAWING] = page
         if moulded := [name for name in ("moulds", "casting") if name in only]:
             shape = geometry(moulds, moulded, check, store, progress)
             shared |= shape["files"]
+            optional.skipped += shape["skipped"]
             parts = list(shape["parts"])
             findings, meshes = list(mould_findings(moulds.spec, shape)), list(shape["check"])
             steps = [
@@ -152,14 +156,16 @@ class Arrayed(Compound):
             ]
         if "unit" in only:
             progress("patch")
-            of_patch, files = _patch(moulds, store)
+            of_patch, files = _patch(moulds, store, optional)
             parts, shared = [*parts, *of_patch], shared | files
         if {"unit", "moulds"} & set(only):
             progress("pictures")
             blank = moulds.blank
             for path, draw in pictures(blank).items():
-                shared[path] = store.file(geometry_key(blank, path), draw)
-                drawn.append(path)
+                key = geometry_key(blank, path)
+                if sha256 := optional.made(path, partial(store.file, key, draw)):
+                    shared[path] = sha256
+                    drawn.append(path)
         if "casting" in only:
             progress("casting")
             made = _procedure(moulds, [step["layer_volume_mm3"] for step in steps], printed_mm3(parts), units)
@@ -208,6 +214,13 @@ class Arrayed(Compound):
             skipped=[
                 *_skipped(only, check, first["skipped"]),
                 *(Skipped(output=output, reason=reason) for output, reason in lacking.items()),
+                *optional.skipped,
+                *(
+                    Skipped(output=f"{folder}/{each['output']}", reason=each["reason"])
+                    for folder, product in units.items()
+                    for each in product.manifest["skipped"]
+                    if each["reason"].startswith(UNMADE)
+                ),
             ],
             versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
             files={},
@@ -244,7 +257,7 @@ def _given(moulds: PatchMoulds, unit: Spec) -> frozenset[str]:
     return frozenset(key.removeprefix(path) for key in moulds.given for path in paths if key.startswith(path))
 
 
-def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[str, str]]:
+def _patch(moulds: PatchMoulds, store: Store, optional: OptionalFiles) -> tuple[list[PartRecord], dict[str, str]]:
     """Return records and files of the silicone that the units share, and the files of the whole patch."""
     blank, bodies, formats = moulds.blank, patch_bodies(moulds.array), moulds.spec.output.formats
     # A helper makes it in the meantime.
@@ -261,10 +274,14 @@ def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[st
             files[path] = store.file(body_key(blank, body, "stl"), partial(stl_content, blank, body))
             part["files"]["stl"] = BodyFile(path=path, sha256=files[path])
         parts.append(part)
+    whole = {planned.path: (planned.key, planned.make) for planned in step}
     if "glb" in formats:
         draw = partial(patch_glb, blank, patch_parts(moulds.array))
-        files["patch/patch.glb"] = store.file(joint_key(blank, bodies, "patch.glb"), draw)
-    return parts, files | {planned.path: store.file(planned.key(), planned.make) for planned in step}
+        whole["patch/patch.glb"] = partial(joint_key, blank, bodies, "patch.glb"), draw
+    for path, (key, make) in whole.items():
+        if sha256 := optional.made(path, lambda key=key, make=make: store.file(key(), make)):
+            files[path] = sha256
+    return parts, files
 
 
 def _procedure(

@@ -38,6 +38,7 @@ from unitcad.errors import UnitcadError, WrongArgument, install_command
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
+from unitcad.pipeline.optional import UNMADE
 from unitcad.pipeline.subjects import Compound, load_subject
 from unitcad.pipeline.write import BENCH, PAGE, Built, hold_folder
 from unitcad.pipeline.write import build as build_subject
@@ -244,6 +245,8 @@ def _print_faults(manifest: Manifest) -> None:
     for entry in manifest["skipped"]:
         if entry["reason"] == NO_KERNEL:
             warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
+        if entry["reason"].startswith(UNMADE):
+            warn(f"warning: {entry['output']} {entry['reason']}")
     checks = manifest["mould_checks"]
     for check in checks:
         if check["ok"] and check["advice"]:

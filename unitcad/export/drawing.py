@@ -218,16 +218,17 @@ def across(
     return found
 
 
-def windows(loops: Sequence[Loop], width_at: Callable[[float, float], float]) -> list[Measure]:
-    """Return the openings in the outer faces of a section; `width_at(x, z)` is an opening's width."""
+def windows(loops: Sequence[Loop], width_at: Callable[[float, float], float | None]) -> list[Measure]:
+    """Return the openings in the outer faces of a section; `width_at(x, z)` is an opening's width, None without one."""
     found = list[Measure]()
     sides: tuple[tuple[Side, Callable[..., float]], ...] = (("left", min), ("right", max))
     for side, end in sides:
         edge = end(x for loop in loops for x, _ in loop)
         walls = sorted(sorted((a[1], b[1])) for a, b in _sides(loops) if abs(a[0] - edge) + abs(b[0] - edge) < SAME_MM)
         for (_, low), (high, _) in pairwise(walls):
-            if high - low > SAME_MM:
-                text = f"{coord(width_at(edge, (low + high) / 2), 2)} x {coord(high - low, 2)}"
+            wide = width_at(edge, (low + high) / 2) if high - low > SAME_MM else None
+            if wide is not None:
+                text = f"{coord(wide, 2)} x {coord(high - low, 2)}"
                 found.append(Measure(text, low, high, side, 2 if side == "left" else 0, edge))
     return found
 

@@ -41,6 +41,7 @@ from unitcad.pipeline.manifest import (
     PartRecord,
     PourRecord,
 )
+from unitcad.pipeline.optional import OptionalFiles
 from unitcad.pipeline.plan import (
     GEOMETRIC,
     Planned,
@@ -156,15 +157,17 @@ class Subject:
         if {"moulds", "casting"} & set(outputs):
             moulds.plan  # noqa: B018  # refuses before the long work begins
         own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}
+        optional = OptionalFiles()
         if "pdf" in spec.output.formats and {"unit", "moulds"} & set(outputs):  # its names are the spec's own
             progress("drawing")
-            own[DRAWING] = drawing(moulds, outputs)
+            if drawn := optional.made(DRAWING, lambda: drawing(moulds, outputs)):
+                own[DRAWING] = drawn
         estimate = None
         if "estimate" in outputs:  # first: the helper for STEP loads its kernel in the meantime
             progress("estimate")
             estimate, own["estimate.json"] = _estimate(spec, store)
         shape = geometry(moulds, outputs, check, store, progress)
-        pictures = _shaded_pictures(moulds, outputs, store, progress)
+        pictures = _shaded_pictures(moulds, outputs, store, progress, optional)
         if "casting" in outputs:
             progress("casting")
             volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
@@ -173,6 +176,7 @@ class Subject:
         progress("manifest")
         findings = mould_findings(spec, shape)
         manifest = manifests.of_unit(moulds, outputs, check, shape, findings, estimate, list(pictures))
+        manifest["skipped"] += [*shape["skipped"], *optional.skipped]
         return finish(manifest, own, {**shape["files"], **pictures}, store)
 
 
@@ -205,10 +209,15 @@ def _geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, 
         kept = store.data(body_key(moulds, body, "record"), partial(record, moulds, body))
         parts[body.name] = PartRecord(**{**kept, "files": {}})
     made: dict[str, str] = {}
+    optional = OptionalFiles()
 
     def put(planned: Planned) -> None:
         progress(planned.stage)
-        made[planned.path] = sha256 = store.file(planned.key(), planned.make)
+        meshes = planned.form in MESH_FORMATS
+        sha256 = _filed(store, planned) if meshes else optional.made(planned.path, partial(_filed, store, planned))
+        if sha256 is None:
+            return
+        made[planned.path] = sha256
         for name in planned.bodies:
             copies = planned.bodies.count(name)
             parts[name]["files"][planned.form] = BodyFile(path=planned.path, sha256=sha256)
@@ -233,16 +242,25 @@ def _geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, 
         "strains": strained,
         "check": meshes,
         "files": made,
+        "skipped": optional.skipped,
     }
 
 
-def _shaded_pictures(moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress) -> dict[str, str]:
+def _filed(store: Store, planned: Planned) -> str:
+    """Return the SHA-256 of a planned file, made if the store lacks it."""
+    return store.file(planned.key(), planned.make)
+
+
+def _shaded_pictures(
+    moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress, optional: OptionalFiles
+) -> dict[str, str]:
     """Return the pictures that the format png asks for, path to SHA-256."""
     if "png" not in moulds.spec.output.formats:
         return {}
     progress("pictures")
     scenes = [planned for planned in plan(moulds.blank, only, ("png",)) if planned.form == "png"]
-    return {planned.path: store.file(planned.key(), planned.make) for planned in scenes}
+    made = {planned.path: optional.made(planned.path, partial(_filed, store, planned)) for planned in scenes}
+    return {path: sha256 for path, sha256 in made.items() if sha256}
 
 
 def _mould_checks(

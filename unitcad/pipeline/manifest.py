@@ -147,7 +147,7 @@ def failed_codes(manifest: Manifest) -> list[str]:
 
 
 class Geometry(TypedDict):
-    """A geometry's content as JSON data: `files` is path -> SHA-256 of content in the store.
+    """A geometry's content as JSON data: `files` is path -> SHA-256 of content in the store, `skipped` has no file.
 
     The strains are compared with a limit by each variant, since it is that of its silicones.
     """
@@ -160,6 +160,7 @@ class Geometry(TypedDict):
     strains: list[dict[str, Any]]
     check: list[MeshFinding]
     files: dict[str, str]
+    skipped: list[Skipped]
 
 
 def of_unit(

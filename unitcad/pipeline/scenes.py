@@ -28,6 +28,9 @@ ASIDE = 12.0
 LEAST_SIDE_MM = 1.5
 """A side of an outline from above that is shorter than this gets no dimension: a facet of a circle is."""
 
+SECTIONS = 16
+"""Planes that are tried for the section of a piece without a cell."""
+
 Offset = tuple[float, float, float]
 
 
@@ -215,12 +218,13 @@ def drawing(moulds: MouldSet, only: Sequence[str]) -> bytes:
 
 
 def _views(moulds: MouldSet, body: Body) -> tuple[Callable[[float], str], ...]:
-    """Draw a tool cut through the first cell, with widths, heights and windows, and from above."""
+    """Draw a tool cut through its first cell, with widths, heights and windows, and from above."""
     # A polygon's corners on the circle: a round face is then as wide as it is drawn.
-    cell, solid = moulds.plan.layout.cells[0], realise(body.shape, moulds.segments, 1.0)
+    solid = realise(body.shape, moulds.segments, 1.0)
+    centre, y = _section_plane(moulds, body, solid)
 
     def slices(z: float) -> Iterator[np.ndarray]:
-        return (np.asarray(loop) - (0.0, cell.y) for loop in solid.slice(z).to_polygons())
+        return (np.asarray(loop) - (0.0, y) for loop in solid.slice(z).to_polygons())
 
     def round_at(half: float, centre: float, z: float) -> bool:
         for loop in slices(z):
@@ -230,7 +234,7 @@ def _views(moulds: MouldSet, body: Body) -> tuple[Callable[[float], str], ...]:
                 return True
         return False
 
-    def width_at(x: float, z: float) -> float:
+    def width_at(x: float, z: float) -> float | None:
         inward = x - math.copysign(sheet.LEAST_EDGE_MM / 4, x)
         ends = [
             a[1] + (b[1] - a[1]) * (inward - a[0]) / (b[0] - a[0])
@@ -238,15 +242,33 @@ def _views(moulds: MouldSet, body: Body) -> tuple[Callable[[float], str], ...]:
             for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True)
             if (a[0] > inward) != (b[0] > inward)
         ]
-        return min(y for y in ends if y > 0) - max(y for y in ends if y <= 0)
+        above, below = [at for at in ends if at > 0], [at for at in ends if at <= 0]
+        return min(above) - max(below) if above and below else None
 
-    regions = svg.cut([body], moulds.segments, y=cell.y, swell=1.0)
+    regions = svg.cut([body], moulds.segments, y=y, swell=1.0)
     whole = CrossSection([np.array(loop) for region in regions for loop in region.loops], FillRule.EvenOdd)
     loops = [[(float(x), float(z)) for x, z in loop] for loop in whole.simplify(sheet.SAME_MM / 4).to_polygons()]
-    measures = [*sheet.across(loops, (cell.x, 0.0), round_at), *sheet.upright(loops), *sheet.windows(loops, width_at)]
-    title = f"A - A, cut at y = {cell.y:g}"
+    measures = [*sheet.across(loops, (centre, 0.0), round_at), *sheet.upright(loops), *sheet.windows(loops, width_at)]
+    title = f"A - A, cut at y = {y:.4g}"
     section = partial(svg.section, regions, measures, title=title, ground="seat", named=False)
-    return lambda scale: section(px_per_mm=scale), _plan_view(solid, cell.y)
+    return lambda scale: section(px_per_mm=scale), _plan_view(solid, y)
+
+
+def _section_plane(moulds: MouldSet, body: Body, solid: Manifold) -> tuple[float, float]:
+    """Return x of the first cell in a piece, and y of the plane through it.
+
+    A piece may not reach to the set's first cell. One without a cell is cut at its largest section.
+    """
+
+    def area(at: tuple[float, float]) -> float:
+        loops = [np.array(loop) for region in svg.cut([body], moulds.segments, y=at[1]) for loop in region.loops]
+        return float(CrossSection(loops, FillRule.EvenOdd).area()) if loops else 0.0
+
+    x0, y0, _, x1, y1, _ = bounds(solid)
+    cells = sorted(((cell.x, cell.y) for cell in moulds.plan.layout.cells), key=lambda at: not x0 < at[0] < x1)
+    middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+    levels = [middle, *((middle[0], y0 + (y1 - y0) * i / SECTIONS) for i in range(1, SECTIONS))]
+    return next((at for at in cells if y0 < at[1] < y1 and area(at)), None) or max(levels, key=area)
 
 
 def _plan_view(solid: Manifold, y: float) -> Callable[[float], str]:
