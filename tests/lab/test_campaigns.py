@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import wavfile
+from scipy.signal import lfilter
 from scipy.stats import ttest_ind, ttest_rel
 from signals import RATE, TIME, noise, repeats, wave, write
 
@@ -55,7 +56,64 @@ def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path):
     assert result.levels == ()
     outside = [one.message for one in result.findings if one.code == "L117"]
     assert len(outside) == 6
-    assert "about 44 Hz" in outside[0]
+    assert outside[0] == "the strongest line is at about 44 Hz, below chain.band_hz, 60 to 250 Hz"
+    assert {one.code for one in result.findings} == {"L117", "L112"}
+
+
+@pytest.mark.parametrize("slow", [0.0, 20.0])
+def test_a_motor_above_the_band_is_named_and_not_the_sensors_slow_noise(slow, tmp_path):
+    """An LRA of 260 Hz, in noise that falls with the frequency."""
+    red = lfilter([0.2 * slow], [1, -0.98], np.random.default_rng(3).standard_normal(len(TIME)))
+    repeats(tmp_path, e=wave(20, 260.0) + red, m=wave(60, 260.0) + red)
+    result = campaign(tmp_path, UNIT)
+    said = {one.message for one in result.findings if one.code == "L117"}
+    assert said == {"the strongest line is at about 260 Hz, above chain.band_hz, 60 to 250 Hz"}
+    assert {one.code for one in result.findings} == {"L117", "L112"}
+    assert campaign(tmp_path, f"[chain]\nband_hz = [200.0, 300.0]\n{UNIT}").levels[0].level.value == pytest.approx(
+        1 / 3, rel=0.01
+    )
+
+
+def test_a_unit_at_another_frequency_than_its_motor_is_told_both(tmp_path):
+    repeats(tmp_path, e=wave(90, 170.0), m=wave(300, 130.0))
+    result = campaign(tmp_path, UNIT)
+    said = {one.message for one in result.findings if one.code == "L116"}
+    assert said == {"the strongest line is at about 170 Hz; the motor's is from 104 to 156 Hz"}
+    assert result.levels == ()
+
+
+@pytest.mark.parametrize("size", [0.1, 0.7, 3.0])
+@pytest.mark.parametrize("away", [-35.0, 35.0, 80.0])
+def test_a_second_motor_is_named_and_is_no_noise(away, size, tmp_path):
+    """The level stays right: the motor's own record says which line is its."""
+    repeats(tmp_path, e=wave(100, 137.0) + wave(100 * size, 137.0 + away, 1.0), m=wave(300, 137.0))
+    result = campaign(tmp_path, UNIT)
+    assert {(one.code, one.severity) for one in result.findings} == {("L104", "warning")}
+    (hertz,) = {float(one.message.split()[6]) for one in result.findings}
+    assert hertz == pytest.approx(137.0 + away, abs=0.5)
+    assert result.findings[0].message.endswith("of the one at 137.0 Hz; run one motor at a time")
+    leak = size / (math.pi * abs(away) * 2)  # of the second line into the first, over 2 s
+    assert result.levels[0].level.value == pytest.approx(1 / 3, rel=0.003 + leak)
+
+
+def test_a_hum_of_other_mains_is_told_as_that(tmp_path):
+    repeats(tmp_path, e=wave(100, 137.0) + wave(30, 180.0, 1.0), m=wave(300, 137.0))
+    assert "or set chain.mains_hz = 60" in campaign(tmp_path, UNIT).findings[0].message
+    assert campaign(tmp_path, f"[chain]\nmains_hz = 60\n{UNIT}").findings == ()
+
+
+@pytest.mark.parametrize("settings", ["", "rate_hz = 1000.0\n"])
+def test_a_time_that_begins_again_is_said_and_no_line_is_sought(settings, tmp_path):
+    """Two records in one file. Their mean step is not the file's, and a line would be at another frequency."""
+    for i in range(6):
+        part = (300 if i < 3 else 100) * np.cos(2 * np.pi * 137 * TIME[:1000] * 2 + i)
+        rows = [f"{t / 1000:.4f},{v:.5f}" for v in (part, part[:700]) for t, v in enumerate(v)]
+        (tmp_path / f"{i}.csv").write_text("\n".join(["t (s),u (um)", *rows]) + "\n")
+    unit = '[[unit]]\nname = "a"\nreference = ["0.csv", "1.csv", "2.csv"]\nedge = ["3.csv", "4.csv", "5.csv"]\n'
+    result = campaign(tmp_path, f"[recording]\ntime_column = 1\nchannel = 2\n{settings}{unit}", UM)
+    assert {one.code for one in result.findings} == {"L103", "L112"}
+    assert result.findings[0].message == "the time goes back from 0.999 to 0 s behind sample 1000: two records?"
+    assert result.records["a"][0].rate_hz == pytest.approx(1000.0)
 
 
 def test_a_campaign_has_the_levels_of_its_truth(folder):
@@ -173,8 +231,8 @@ def test_two_motors_at_once_give_no_level(tmp_path):
     result = campaign(tmp_path, BOTH + UNIT)
     assert result.levels == ()
     said = {one.where: one.message for one in result.findings if one.code == "L104"}
-    assert said["m0.wav"] == "another one is at about 126.1 Hz; run one motor at a time"
-    assert said["e0.wav"] == "another one is at about 117.9 Hz; run one motor at a time"
+    assert said["m0.wav"] == "a second line is at about 126.1 Hz, 0.5 of the one at 118.0 Hz; run one motor at a time"
+    assert "about 117.9 Hz" in said["e0.wav"]
 
 
 def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):

@@ -38,10 +38,10 @@ class LineFit:
     """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
 
     `u_noise` is the part of `u` from the noise next to the line. `value` is the complex amplitude against `phase`.
-    `drift` is the range of the frequency over its mean, `snr` the amplitude over the residual's standard deviation,
-    `scatter` the standard deviation of the amplitude of blocks over
-    their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
-    exceeds noise, otherwise 0; `missing` the fraction without numbers.
+    `drift` is the range of the frequency over its mean, `snr` the amplitude over the standard deviation of the residual
+    without the second line, `scatter` the standard deviation of the amplitude of blocks over their mean. `masked` is
+    the fraction of samples excluded by their residual, `dropped` the same if one of them exceeds noise, otherwise 0;
+    `missing` the fraction without numbers.
     """
 
     amplitude: float
@@ -60,7 +60,9 @@ class LineFit:
     mains_hz: float
     """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
     second_hz: float
-    """The frequency of another line near this one; 0 if there is none."""
+    """The frequency of another line; 0 if there is none."""
+    second: float
+    """Its amplitude over this one's."""
     phase: Phase = field(compare=False, repr=False)
 
 
@@ -70,10 +72,12 @@ def fit_line(
     band: tuple[float, float] = BAND_HZ,
     mains_hz: float = 50.0,
     motor: LineFit | None = None,
+    whole_band: tuple[float, float] | None = None,
 ) -> LineFit | None:
     """Return the line of samples x (n) at `rate` in Hz; None if the band has no line.
 
-    With `motor`, the fit of another channel of the record, the line has that channel's phase and its own amplitude.
+    A second line is looked for in `whole_band`, by default the band. With `motor`, the fit of another channel of the
+    record, the line has that channel's phase and its own amplitude.
     """
     good = np.isfinite(x)
     if good.sum() < LEAST_SAMPLES or not np.ptp(x[good]) > 0:
@@ -130,9 +134,12 @@ def fit_line(
         blocks = np.real(block_means(value, turned, use, rate) * np.conj(value)) / amplitude
         wander, scatter = of_mean(blocks, noise**2 * len(blocks))
         deviation = float(np.sqrt(np.mean(residual[use] ** 2)))
-        beside, size = line_beside(
-            turned, rate, max(LEAST_LINE * amplitude, OVER_NOISE * deviation * np.sqrt(2 / use.sum()))
-        )
+        least = max(LEAST_LINE * amplitude, OVER_NOISE * deviation * np.sqrt(2 / use.sum()))
+        beside, size = line_beside(turned, rate, least)
+        if not beside and not size:
+            beside, size = line_apart(turned, rate, LEAST_LINE * amplitude, frequency, whole_band or band, mains_hz)
+        second, modulation = (size, 0.0) if beside else (0.0, size)
+        noise_only = float(np.sqrt(max(deviation**2 - second**2 / 2, 1e-12 * deviation**2)))
         order = round(frequency / mains_hz)
         order = 0 if order in orders else order
         fit = LineFit(
@@ -142,8 +149,8 @@ def fit_line(
             value=value,
             frequency_hz=frequency,
             drift=spread / frequency,
-            snr=abs(value) / deviation if deviation > 0 else float("inf"),
-            scatter=max(scatter, np.sqrt(2) * size) / abs(value) if value else float("inf"),
+            snr=abs(value) / noise_only if deviation > 0 else float("inf"),
+            scatter=max(scatter, np.sqrt(2) * modulation) / abs(value) if value else float("inf"),
             start_s=span[0],
             end_s=span[1],
             masked=masked,
@@ -151,6 +158,7 @@ def fit_line(
             missing=float(np.mean(~good)),
             mains_hz=order * mains_hz,
             second_hz=frequency + beside if beside else 0.0,
+            second=second / amplitude,
             phase=phase,
         )
         return fit, clean, usable
@@ -314,6 +322,9 @@ def coarse_frequency(x: Floats, rate: float, band: tuple[float, float], mains_hz
     inside = (frequency >= band[0]) & (frequency <= min(band[1], 0.45 * rate))
     if not inside.any() or not np.any(size[inside] > 0):
         return 0.0
+    tops = np.zeros(len(size), bool)  # the skirt of a line outside the band is none in it
+    tops[1:-1] = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])
+    inside = inside & tops if np.any(inside & tops) else inside
     width = 1.5 * rate / len(x)
     off = inside & (np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > width)
     peak = int(np.argmax(np.where(inside, size, 0.0)))
@@ -452,30 +463,63 @@ def block_means(value: complex, residual: Floats, good: Bools, rate: float) -> F
     return value + 2 * np.add.reduceat(residual, edges) / np.maximum(np.add.reduceat(good.astype(float), edges), 1)
 
 
-# A second line next to the strongest: another motor that runs.
+# A second line: another motor that runs.
 
 BESIDE_HZ = 15.0
-"""Distance from the strongest line, to either side, within which a second one is searched."""
+"""Distance from the strongest line, to either side, within which a second one may be taken for the first."""
 LEAST_LINE = 0.05
 """Part of the strongest line's amplitude from which another one counts."""
 OVER_NOISE = 8
 """Standard deviations of noise from which a peak of the spectrum counts as a line."""
+OVER_MEDIAN = 6.0
+"""Medians of the spectrum's size around it from which a peak is a line: of 1,000 bins of noise the largest has 3.2."""
 MOST_MIRRORED = 0.25
 """Part of a second line's size that the spectrum has as far on the other side of the first; of a modulation all."""
+OWN_MULTIPLES = (0.5, 2.0, 3.0, 4.0, 5.0)
+"""Lines of the same motor: harmonics, and a rattle at every second turn."""
 
 
 def line_beside(residual: Floats, rate: float, least: float) -> tuple[float, float]:
-    """Return the distance of a second line from the first in Hz, 0 without one, and the size of a modulation or 0.
+    """Return the distance of a second line from the first in Hz and its size; 0 and the size of a modulation, or 0.
 
     `residual` is that of the fit, turned back by the line's phase; `least` the least size that counts. A second line is
     on one side of the first, a modulation of the amplitude on both. A beat slower than about 2 Hz looks like a
     modulation: the line's phase follows it.
     """
-    window, count = np.hanning(len(residual)), _length(len(residual))
-    size = 2 * np.abs(np.fft.fft(residual * window, count)) / max(window.sum(), 1e-300)
-    distance = np.fft.fftfreq(count, 1 / rate)
+    distance, size = _turned_spectrum(residual, rate)
     peak = int(np.argmax(np.where(np.abs(distance) < BESIDE_HZ, size, 0.0)))
     if size[peak] < least:
         return 0.0, 0.0
-    second = size[-peak] < MOST_MIRRORED * size[peak]
-    return (float(distance[peak]), 0.0) if second else (0.0, float(size[peak]))
+    return (float(distance[peak]) if size[-peak] < MOST_MIRRORED * size[peak] else 0.0), float(size[peak])
+
+
+def line_apart(
+    residual: Floats, rate: float, least: float, hertz: float, band: tuple[float, float], mains_hz: float
+) -> tuple[float, float]:
+    """Return what `line_beside` does, of a second line in a band that is farther away from the first one at `hertz`.
+
+    A multiple of the mains' frequency, and a harmonic of the first line, is no second one.
+    """
+    distance, size = _turned_spectrum(residual, rate)
+    at, near = distance + hertz, max(1.0, 2.5 * rate / len(residual))
+    counts = (np.abs(distance) >= BESIDE_HZ) & (at >= band[0]) & (at <= min(band[1], 0.45 * rate))
+    counts &= ~near_multiple(at, mains_hz, near)
+    for multiple in OWN_MULTIPLES:
+        counts &= np.abs(at - multiple * hertz) > near
+    peak = int(np.argmax(np.where(counts, size, 0.0)))
+    around = size[np.abs(distance - distance[peak]) < BESIDE_HZ]
+    if size[peak] < max(least, OVER_MEDIAN * float(np.median(around))):
+        return 0.0, 0.0
+    return (float(distance[peak]) if size[-peak] < MOST_MIRRORED * size[peak] else 0.0), float(size[peak])
+
+
+def near_multiple(frequency: Floats, mains_hz: float, near: float) -> Bools:
+    """Tell which frequencies are within `near` of a multiple of the mains' frequency."""
+    return np.abs(frequency - mains_hz * np.maximum(np.round(frequency / mains_hz), 1)) <= near
+
+
+def _turned_spectrum(residual: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Return distances from the line in Hz and amplitudes of a residual that is turned back by the line's phase."""
+    window, count = np.hanning(len(residual)), _length(len(residual))
+    size = 2 * np.abs(np.fft.fft(residual * window, count)) / max(window.sum(), 1e-300)
+    return np.fft.fftfreq(count, 1 / rate), size

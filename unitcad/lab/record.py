@@ -13,8 +13,17 @@ from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats
 from unitcad.lab import bandpass
-from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable
-from unitcad.lab.line import LineFit, clip_level, fit_line, spectrum
+from unitcad.lab.campaign import Campaign, ChainTable, RecordingTable, SensorTable
+from unitcad.lab.line import (
+    BESIDE_HZ,
+    OVER_MEDIAN,
+    OWN_MULTIPLES,
+    LineFit,
+    clip_level,
+    fit_line,
+    near_multiple,
+    spectrum,
+)
 from unitcad.lab.readers import TIME_NAMES, Channel, Layout, Recording, open_recording
 from unitcad.lab.units import UNITS, is_signal_unit, plain, ratio, seconds, to_si
 from unitcad.meshcheck.rules.registry import Rule
@@ -31,11 +40,13 @@ RULES = {
             Fewer than four samples a period: the sensor's filter and aliases change the amplitude.
             Example: 400 Hz for a motor of 125 Hz. Fix: Sample at 1 kHz or faster.""",
             """L103 error: uneven time axis
-            A time is off an even grid by more than 0.3 of a step: samples are missing or the clock
-            varies. Example: A logger over USB that loses a packet. Fix: Record with a hardware clock.""",
+            A time is off an even grid by more than 0.3 of a step, or goes back: samples are missing, the clock varies,
+            or the file has two records. No line is fitted. Example: A logger over USB that loses a packet. Fix: Record
+            with a hardware clock; write each record to a file of its own.""",
             """L104 error: several lines
-            A second line is near the strongest one, so the record is not used: either may be the motor's. Example: Two
-            motors of an array at once. Fix: Run one motor at a time.""",
+            The record has a second line. It is an error if either may be the motor's: within 15 Hz, or half as strong
+            in the band that is searched. Otherwise it is a warning. Example: Two motors of an array at once.
+            Fix: Run one motor at a time; if it is a multiple of the mains, set chain.mains_hz.""",
             """L105 warning: line on the mains
             The record can't tell the line from a multiple of the mains' frequency. Example: A motor at
             100.2 Hz over 2 s. Fix: Record longer, or change the drive's voltage until the line is off the
@@ -69,11 +80,11 @@ RULES = {
             The chain gives no amplitude of a record with drop-outs, missing samples or too few samples.
             Example: The chain bandpass and a spike. Fix: Use the chain line.""",
             """L116 error: motor and unit at different frequencies
-            No line of the unit is within a tenth of the motor's frequency: no level is given.
+            No line of the unit is near the motor's frequency: no level is given.
             Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
-            """L117 error: stronger line below the band
-            A line below chain.band_hz is stronger than the one in it, which may be its harmonic.
-            Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
+            """L117 error: stronger line outside the band
+            A line below or above chain.band_hz is stronger than any in it. Example: A motor at 45 Hz, whose
+            harmonic is in a band from 60 Hz; an LRA at 260 Hz. Fix: Widen chain.band_hz beyond that line.""",
             """L118 warning: low signal to noise
             The amplitude is less than ten times the standard deviation of the residual. Example: A point far from
             the unit. Fix: Record longer, average more, or a sensor of a smaller range.""",
@@ -130,8 +141,8 @@ class Unit:
 class Signal:
     """A record's samples (n, channels) at `rate` in Hz: means of `averaged` neighbours of the file's at `raw_rate`.
 
-    `count` and `missing`: samples of the file, and of each channel those that are no numbers; `off_grid`: the largest
-    distance of a time from an even grid, in steps. `units`: of each channel, as read.
+    `count` and `missing`: samples of the file, and of each channel those that are no numbers. `uneven`: why the times
+    are no even grid, "" if they are, or if they do not determine the rate. `units`: of each channel, as read.
     """
 
     samples: Floats
@@ -139,7 +150,7 @@ class Signal:
     averaged: int
     count: int
     missing: tuple[int, ...]
-    off_grid: float
+    uneven: str
     units: tuple[Unit, ...]
 
     @property
@@ -187,20 +198,28 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     )
     samples = recording.columns(columns)
     count, missing = len(samples), tuple(int(n) for n in np.count_nonzero(~np.isfinite(samples), axis=0))
-    off_grid = 0.0 if stamps is None else _off_grid(stamps, rate)
+    uneven = "" if stamps is None else _uneven(stamps, rate)
     if (length := count / rate) > LONGEST_S:
         raise Refusal(shown, None, f"lasts {length:.4g} s; cut the record to {LONGEST_S:g} s or less")
     samples = samples * factors
     averaged = max(min(int(rate / HIGHEST_RATE), count), 1)
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
-    return Signal(samples, rate, averaged, count, missing, off_grid, units)
+    return Signal(samples, rate, averaged, count, missing, uneven, units)
 
 
-def _off_grid(stamps: Floats, rate: float) -> float:
-    """Return the largest distance of a time from an even grid, in steps."""
-    off = np.abs((stamps - stamps[0]) * rate - np.arange(len(stamps)))
-    return float(off.max()) if np.isfinite(off).all() else np.inf
+def _uneven(stamps: Floats, rate: float) -> str:
+    """Return why times are no even grid, "" if they are."""
+    if not np.isfinite(stamps).all():
+        return f"{np.count_nonzero(~np.isfinite(stamps))} times are no numbers"
+    steps = np.diff(stamps)
+    if (steps < 0).any():
+        at = int(np.argmax(steps < 0))
+        return (
+            f"the time goes back from {stamps[at]:.6g} to {stamps[at + 1]:.6g} s behind sample {at + 1}: two records?"
+        )
+    off = float(np.abs((stamps - stamps[0]) * rate - np.arange(len(stamps))).max())
+    return f"a time is {off:.2g} steps off an even grid" if off > IRREGULAR else ""
 
 
 def assumed_unit(sensor: SensorTable) -> str:
@@ -244,7 +263,7 @@ def _factor(sensor: SensorTable, channel: Channel, key: str, shown: str) -> floa
 def _rate(
     recording: Recording, table: RecordingTable, time: int | None, column: int, shown: str
 ) -> tuple[float, Floats | None]:
-    """Return the rate in Hz, and the times in s if they determine it.
+    """Return the rate in Hz, and the times in s if they determine it or go back.
 
     Raises Refusal if the file says another rate than the campaign does.
     """
@@ -260,7 +279,7 @@ def _rate(
         says = "its header" if time is None else f"its column {recording.channels[time].name!r}"
         limit = f"differs from {shown}, which has {own:.6g} Hz by {says}"
         raise Refusal("recording.rate_hz", table.rate_hz, limit, float(f"{own:.9g}"))
-    return table.rate_hz, None
+    return table.rate_hz, stamps if stamps is not None and (np.diff(stamps) < 0).any() else None
 
 
 def _own_rate(
@@ -276,9 +295,12 @@ def _own_rate(
     if not unit:
         raise Refusal("recording.time_unit", None, f"is needed: {shown} does not say the unit of its time")
     stamps = recording.columns([time])[:, 0] * seconds(unit, "recording.time_unit")
-    if len(stamps) < 2 or not stamps[-1] > stamps[0]:
+    steps = np.diff(stamps)
+    back = bool((steps < 0).any())
+    if len(stamps) < 2 or not np.nanmedian(steps) > 0:
         raise Refusal("recording.time_column", recording.channels[time].name, f"does not rise in {shown}")
-    return float((len(stamps) - 1) / (stamps[-1] - stamps[0])), stamps
+    step = float(np.nanmedian(steps)) if back else (stamps[-1] - stamps[0]) / (len(stamps) - 1)
+    return 1 / step, stamps
 
 
 LEAST_GAIN = 0.9
@@ -291,6 +313,8 @@ LEAST_STEADY = 0.5
 TREMOR_HZ = 20
 """Part of a record that its steady part is at least: a motor that spins up and runs leaves more of 2 s."""
 LEAST_SNR = 10.0
+AS_STRONG = 0.5
+"""Part of a line's amplitude from which a second one far from it may be the motor's as well."""
 LEAST_OVER_U = 5
 """The strongest of the 400 bins of noise in a band of 190 Hz over 2 s is above 4 in a record of ten, above 5 in few of
 a thousand.
@@ -364,13 +388,10 @@ def measure_record(
     signal = open_signal(path, campaign.recording, sensors, shown)
     names = (shown, f"{shown}, motor")[: len(sensors)]
     samples, rate = signal.samples, signal.rate
-    frequency, size = spectrum(np.where(np.isfinite(samples[:, 0]), samples[:, 0], 0.0), rate)
-    low = frequency <= min(HIGHEST_HZ, rate / 2)
-    frequency, size = frequency[low], size[low]
-    picture = (np.arange(len(samples)) / rate, samples[:, 0], frequency, size)
+    picture = (np.arange(len(samples)) / rate, samples[:, 0], *_spectrum(samples[:, 0], rate))
     findings: list[LabFinding] = []
-    if signal.off_grid > IRREGULAR:
-        findings.append(finding("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
+    if signal.uneven:
+        findings.append(finding("L103", shown, signal.uneven))
     for channel, gaps, where in zip(samples.T, signal.missing, names, strict=True):
         if (level := clip_level(channel)) < np.inf:
             findings.append(finding("L101", where, f"at about {level:.2f} of the amplitude"))
@@ -380,17 +401,19 @@ def measure_record(
             findings.append(finding("L119", where, message, severity))
     unit = sensors[0].unit
     none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, signal.units, picture, ())
-    if any(one.code == "L101" for one in findings):
+    if any(one.code in ("L101", "L103") for one in findings):
         return replace(none, findings=tuple(findings))
-    fits = _fits(samples, rate, band, campaign.chain.mains_hz)
-    for each, where in zip(fits, names, strict=True):
-        if each is None:
+    fits = _fits(samples, rate, band, campaign.chain)
+    for each, channel, where in zip(fits, samples.T, names, strict=True):
+        elsewhere = _elsewhere(_spectrum(channel, rate), each, band, campaign.chain, where)
+        if elsewhere or each is None:
             message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz"
-            return replace(none, findings=(*findings, finding("L111", where, message)))
+            return replace(none, findings=(*findings, elsewhere or finding("L111", where, message)))
     lines = [each for each in fits if each]
     fit = lines[0]
-    for each, where in zip(lines, names, strict=True):
-        for one in _of_line(each, rate, signal.raw_rate, where):
+    for i, (each, where) in enumerate(zip(lines, names, strict=True)):
+        searched = band if i == len(lines) - 1 else (0.0, 0.0)  # the unit's channel has the phase of the motor's line
+        for one in _of_line(each, rate, signal.raw_rate, where, searched):
             if each is fit or one.code not in _OF_THE_RATE:
                 findings.append(one)
     steady, length = fit.end_s - fit.start_s, len(samples) / rate
@@ -398,9 +421,6 @@ def measure_record(
         message = f"steady for {steady:.2f} s of {length:.2f} s; only that part was used"
         findings.append(finding("L107", shown, message))
     hertz = fit.frequency_hz
-    below = _stronger_below(frequency, size, campaign.chain.band_hz[0], campaign.chain.mains_hz, hertz)
-    if below is not None:
-        findings.append(finding("L117", shown, f"a stronger line is at about {below:.0f} Hz, below chain.band_hz"))
     scales = [displacement(sensor, hertz) / signal.gain(hertz) for sensor in sensors]
     amplitudes, gain = {"line": [each.amplitude for each in lines]}, None
     if "bandpass" in campaign.chain.use:
@@ -440,26 +460,62 @@ def displacement(sensor: SensorTable, frequency_hz: float) -> float:
     return 1e6 * si / (2 * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
 
 
-def _fits(samples: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> list[LineFit | None]:
+def _spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Return frequencies in Hz up to HIGHEST_HZ and amplitudes of a channel, with zeros for missing samples."""
+    frequency, size = spectrum(np.where(np.isfinite(x), x, 0.0), rate)
+    low = frequency <= min(HIGHEST_HZ, rate / 2)
+    return frequency[low], size[low]
+
+
+def _fits(samples: Floats, rate: float, band: tuple[float, float], chain: ChainTable) -> list[LineFit | None]:
     """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
     fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
-        fit = fit_line(samples[:, i], rate, band, mains_hz, fits[0] if fits else None)
+        fit = fit_line(samples[:, i], rate, band, chain.mains_hz, fits[0] if fits else None, chain.band_hz)
         fits.insert(0, fit if fit and fit.amplitude > 0 else None)
     return fits
 
 
-def _stronger_below(frequency: Floats, size: Floats, low: float, mains_hz: float, own_hz: float) -> float | None:
-    """Return the frequency of a line below `low` in a spectrum that is stronger than the one at `own_hz`, if any."""
+def _elsewhere(
+    spectrum: tuple[Floats, Floats], fit: LineFit | None, band: tuple[float, float], chain: ChainTable, where: str
+) -> LabFinding | None:
+    """Return the finding that the strongest line of a channel is not in the band in which it was searched, if so.
+
+    A fit within the campaign's band counts if it is a line; a harmonic of it is no other line.
+    """
+    frequency, size = spectrum
+    if len(frequency) < 3:
+        return None
+    own_hz = fit.frequency_hz if fit and _is_line(fit) else 0.0
     near = max(1.0, 3 * float(frequency[1]))
-    below = (frequency > TREMOR_HZ) & (frequency < low - near) & (np.abs(frequency - mains_hz) > near)
-    at = int(np.argmax(np.where(below, size, 0.0)))
-    own = size[np.abs(frequency - own_hz) <= near].max(initial=0.0)
-    return float(frequency[at]) if below[at] and size[at] > own else None
+    counts = (frequency > TREMOR_HZ) & ~near_multiple(frequency, chain.mains_hz, near)
+    for multiple in (1.0, *OWN_MULTIPLES[1:]) if own_hz else ():
+        counts &= np.abs(frequency - multiple * own_hz) > near
+    low, high = chain.band_hz if own_hz else band
+    counts &= (frequency < low - near) | (frequency > high + near)
+    at = int(np.argmax(np.where(counts, size, 0.0)))
+    own = size[np.abs(frequency - own_hz) <= near].max(initial=0.0) if own_hz else 0.0
+    around = size[np.abs(frequency - frequency[at]) < BESIDE_HZ]
+    if not counts[at] or size[at] <= own or size[at] < OVER_MEDIAN * float(np.median(around)):
+        return None
+    hertz = float(frequency[at])
+    if chain.band_hz[0] <= hertz <= chain.band_hz[1]:
+        message = (
+            f"the strongest line is at about {hertz:.0f} Hz; the motor's is from {band[0]:.0f} to {band[1]:.0f} Hz"
+        )
+        return finding("L116", where, message)
+    end = "below" if hertz < chain.band_hz[0] else "above"
+    message = f"the strongest line is at about {hertz:.0f} Hz, {end} chain.band_hz, {chain.band_hz[0]:g} to"
+    return finding("L117", where, f"{message} {chain.band_hz[1]:g} Hz")
 
 
-def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str) -> list[LabFinding]:
-    """Return the findings about a single line, in the order of their codes."""
+def _is_line(fit: LineFit) -> bool:
+    """Tell whether a fit is a line: its amplitude is above five times its uncertainty."""
+    return fit.amplitude >= LEAST_OVER_U * (fit.u if fit.snr < 1 else fit.u_noise)
+
+
+def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, searched: tuple[float, float]) -> list[LabFinding]:
+    """Return the findings about a single line, `searched` in a band, in the order of their codes."""
     out = []
 
     def say(code: str, message: str, severity: str | None = None) -> None:
@@ -468,12 +524,17 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str) -> list[Lab
     hertz = fit.frequency_hz
     if fit.masked > MOST_MASKED:
         say("L110", f"{fit.masked:.0%} of the samples were excluded")
-    own = fit.u if fit.snr < 1 else fit.u_noise
-    if fit.amplitude < LEAST_OVER_U * own:  # nothing else can be said of a line that is not there
+    if not _is_line(fit):  # nothing else can be said of a line that is not there
+        own = fit.u if fit.snr < 1 else fit.u_noise
         say("L111", f"the strongest has {fit.amplitude / own:.1f} times its uncertainty")
         return out
     if fit.second_hz:
-        say("L104", f"another one is at about {fit.second_hz:.1f} Hz; run one motor at a time")
+        either = fit.second >= AS_STRONG and searched[0] <= fit.second_hz <= searched[1]
+        message = f"a second line is at about {fit.second_hz:.1f} Hz, {fit.second:.2g} of the one at {hertz:.1f} Hz"
+        mains = next((one for one in (50, 60) if near_multiple(np.array([fit.second_hz]), one, 0.5)[0]), None)
+        hint = f", or set chain.mains_hz = {mains}" if mains else ""
+        severity = "error" if either or abs(fit.second_hz - hertz) < BESIDE_HZ else "warning"
+        say("L104", f"{message}; run one motor at a time{hint}", severity)
     if raw_rate < 4 * hertz:
         say("L102", f"{raw_rate:g} Hz for a line at {hertz:.1f} Hz")
     if fit.mains_hz:
@@ -487,6 +548,6 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str) -> list[Lab
     if scatter > MOST_SCATTER or fit.drift > MOST_DRIFT:
         severity = "error" if scatter > NO_SCATTER else "warning"
         say("L107", f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}", severity)
-    if fit.snr < LEAST_SNR and scatter <= MOST_SCATTER:  # a modulation is no noise
+    if fit.snr < LEAST_SNR and scatter <= MOST_SCATTER and not fit.second_hz:  # a modulation is no noise
         say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
     return sorted(out, key=lambda one: one.code)
