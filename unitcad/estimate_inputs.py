@@ -192,6 +192,8 @@ def _quasistatic(material: Material) -> Quantity:
 
 def _no_modulus(material: Material) -> str:
     static = material.modulus_100pct_kpa
+    if static is None:
+        return "no small-strain modulus at the motor's frequency is known, nor a static one"
     whose = "the data sheet's 100 % modulus" if static.status == "datasheet" else "the 100 % modulus"
     source = "" if static.status == "datasheet" else f"; {static.status}: {static.source}"
     return (

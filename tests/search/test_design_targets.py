@@ -33,7 +33,12 @@ from unitcad.validation.load import shipped_files
         ),
         ({"at_hand": {"materials": ["ecoflex-00-10"] * 2}}, "at_hand.materials.1", "is given twice", None),
         ({"at_hand": {"designs": ["embeded"]}}, "at_hand.designs.0", "unknown name", "embedded"),
-        ({"at_hand": {"materials": ["ecoflex-00-50"]}}, "at_hand.materials", "no level can be estimated", None),
+        (
+            {"at_hand": {"materials": ["ecoflex-00-50"]}},
+            "at_hand.materials",
+            "none can be tried: ecoflex-00-50: no",
+            None,
+        ),
         ({"vary": {"wall_mm": [2.0, 1.0]}}, "vary.wall_mm", "from the least to the largest", [1.0, 2.0]),
         ({"vary": {"layers": [1, 9]}}, "vary.layers.1", "at most 2", 2),
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),

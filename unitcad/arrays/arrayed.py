@@ -39,6 +39,7 @@ from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_
 from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
 from unitcad.cache import Store, digest
+from unitcad.casting.figures import check_castable
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.procedure_text import files as written
@@ -128,7 +129,7 @@ class Arrayed(Compound):
     def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
         array: Array = self.of
         moulds = self.moulds
-        moulds.plan  # noqa: B018  # refuses before the long work begins
+        check_castable(moulds)  # refuses before the long work begins
         units = {
             folder: _unit(moulds, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()
         }

@@ -120,7 +120,8 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
             "sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= LEAST_THICKNESS else None
         )
     if way.own_tails:
-        _check_hold(hold, distinct, float(known[material].elongation_pct))
+        stretch = catalogue.needed(known[material], "elongation_pct", "a limit of stretch")
+        _check_hold(hold, distinct, float(stretch))
     elif table.hold_mm is not None:
         raise Refusal("sheet.hold_mm", table.hold_mm, f"{asked.array} has no pockets for units: leave it out")
     margin = table.margin_mm

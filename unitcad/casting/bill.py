@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.casting.drawings import tape_places, tongue_prop
-from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
+from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch, for_casting
 from unitcad.casting.plates import SPARE_TONGUE, made_pieces
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
 from unitcad.moulds.base import PRY_HALF_WIDTH
@@ -41,10 +41,11 @@ def bill(
     items = [*list_pieces(moulds)]
     for material in dict.fromkeys([*(batch.silicone for batch in batches), *(more.silicone for more in after)]):
         own = [batch.mix for batch in batches if batch.silicone == material]
-        ratio, later = float(material.mix_ratio), [more for more in after if more.silicone == material]
+        ratio, later = float(for_casting(material, "mix_ratio")), [more for more in after if more.silicone == material]
         uses = [f"{len(own)} pour{'' if len(own) == 1 else 's'}"] if own else []
         uses += [f"{number(more.grams, 3)} g for the {more.use}" for more in later]
-        note = f"{' and '.join(uses)}, mix ratio {number(ratio, 3)} A to 1 B, Shore {material.shore.value}"
+        note = f"{' and '.join(uses)}, mix ratio {number(ratio, 3)} A to 1 B"
+        note += f", Shore {material.shore.value}" if material.shore else ""
         part_b = sum(more.grams for more in later) / (1 + ratio)
         part_a, part_b = sum(m.part_a_g for m in own) + ratio * part_b, sum(m.part_b_g for m in own) + part_b
         items += [

@@ -6,14 +6,15 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from unitcad.catalogue import Material, Value
+from unitcad.catalogue import Material, Value, materials, needed
 from unitcad.designs.dimensions import growth
+from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.moulds.cup import ribs
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import exact_volume
 from unitcad.spec import Spec, printer_of
-from unitcad.text import number
+from unitcad.text import join_words, number
 
 GRAVITY = 9.80665
 BUBBLE_MM = 0.2
@@ -44,6 +45,8 @@ RESIN_LAYER_S = 10.0
 """Time of a resin printer for a layer, s (assumed)."""
 MOST_ERROR_PCT = 5.0
 """Error of the ratio by the scale at which a cure begins to suffer (assumed)."""
+CASTING_NEEDS = "mix_ratio", "cure_h", "elongation_pct"
+"""Values of a silicone without which there is no casting: grams, times, and the strain at which it tears."""
 DATASHEET_C = 23.0
 DOUBLING_K = 10.0
 """A cure runs twice as fast 10 K warmer (assumed): the lower end of van 't Hoff's rule, two to four times.
@@ -96,9 +99,40 @@ class Mix:
         return next((size for size in SYRINGES_ML if size >= self.millilitres), SYRINGES_ML[-1])
 
 
+def for_casting(material: Material, key: str) -> Value[float]:
+    """Return a value that no casting can do without. Raises Refusal if no source gives it."""
+    return needed(material, key, "casting")
+
+
+def not_castable(material: Material) -> list[str]:
+    """Return the keys without which a silicone can't be cast, and which no source gives."""
+    return [key for key in CASTING_NEEDS if getattr(material, key) is None]
+
+
+def check_castable(moulds: MouldSet) -> None:
+    """Raise Refusal if there are no moulds, or a silicone of a pour lacks a value without which it can't be cast."""
+    known = materials(moulds.spec.materials)
+    for step in moulds.plan.steps:
+        for key in not_castable(known[step.material]):
+            try:
+                for_casting(known[step.material], key)
+            except Refusal as refusal:
+                raise Refusal(refusal.field, None, f"{refusal.limit}{UNIT_ALONE}") from None
+
+
+def cure_hours(material: Material, room_c: float) -> float:
+    """Return how long a silicone cures in the room."""
+    return at_room(float(for_casting(material, "cure_h")), room_c)
+
+
+def pot_life(material: Material, room_c: float) -> float | None:
+    """Return the pot life in the room, min; None if no source gives it."""
+    return at_room(float(material.pot_life_min), room_c) if material.pot_life_min else None
+
+
 def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
     """Return the weights for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
-    casting, ratio = spec.casting, float(material.mix_ratio)
+    casting, ratio = spec.casting, float(for_casting(material, "mix_ratio"))
     net = volume_mm3 * float(material.density_g_cm3) / 1000
     density = float(material.density_g_cm3)
     syringe = net / density + HELD_BACK_ML if spec.moulds.pour == "injected" else 0.0
@@ -109,11 +143,14 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
     return Mix(net, total, total * share, total * (1 - share), error, total / density, syringe)
 
 
-def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
+def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float | None:
     """Return the seconds that a bubble takes through a depth by Stokes' law, at the viscosity just mixed: optimistic.
 
-    v = 2/9 (density of silicone) g radius^2 / viscosity; the air's own density is ignored.
+    None if no source gives the viscosity. v = 2/9 (density of silicone) g radius^2 / viscosity; the air's own density
+    is ignored.
     """
+    if material.mixed_viscosity_cps is None:
+        return None
     density, viscosity = 1000 * float(material.density_g_cm3), float(material.mixed_viscosity_cps) / 1000
     speed = 2 / 9 * density * GRAVITY * (bubble_mm / 2000) ** 2 / viscosity
     return depth_mm / 1000 / speed
@@ -194,19 +231,26 @@ class Batch:
         return self.moulds.spec.casting.vacuum
 
     @property
-    def pot_min(self) -> float:
-        """The pot life in the room."""
-        return at_room(float(self.silicone.pot_life_min), self.moulds.spec.casting.room_c)
+    def pot_min(self) -> float | None:
+        """The pot life in the room; None if no source gives it."""
+        return pot_life(self.silicone, self.moulds.spec.casting.room_c)
 
     @property
     def cure_h(self) -> float:
         """The cure in the room."""
-        return at_room(float(self.silicone.cure_h), self.moulds.spec.casting.room_c)
+        return cure_hours(self.silicone, self.moulds.spec.casting.room_c)
 
     @property
-    def rise_min(self) -> float:
-        """How long bubbles take to rise out."""
-        return bubble_rise_s(self.step.rim, self.silicone) / 60
+    def rise_min(self) -> float | None:
+        """How long bubbles take to rise out; None if no source gives the viscosity."""
+        seconds = bubble_rise_s(self.step.rim, self.silicone)
+        return None if seconds is None else seconds / 60
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The values that the procedure would show, but no source gives."""
+        values = {"pot life": self.silicone.pot_life_min, "viscosity": self.silicone.mixed_viscosity_cps}
+        return tuple(name for name, value in values.items() if value is None)
 
     @property
     def rest_min(self) -> float:
@@ -214,17 +258,26 @@ class Batch:
 
         In a syringe bubbles that do not rise in time still gather at its tip: wait the whole allowance.
         """
+        if self.pot_min is None:
+            return 0.0
         allowed, injected = WITHOUT_VACUUM * self.pot_min, self.moulds.spec.moulds.pour == "injected"
-        return min(self.rise_min, allowed) if injected or self.rise_min <= allowed else 0.0
+        rise = math.inf if self.rise_min is None else self.rise_min
+        return min(rise, allowed) if injected or rise <= allowed else 0.0
 
     @property
     def bubbles_stay(self) -> bool:
-        """Whether bubbles do not rise out by themselves in a quarter of the pot life, and no vacuum draws them out."""
-        return not self.vacuum and self.rise_min > WITHOUT_VACUUM * self.pot_min
+        """Whether bubbles do not rise out by themselves in a quarter of the pot life, and no vacuum draws them out.
+
+        False if that is not known.
+        """
+        rise, pot = self.rise_min, self.pot_min
+        return not self.vacuum and rise is not None and pot is not None and rise > WITHOUT_VACUUM * pot
 
     @property
     def over_pot_life_min(self) -> float:
-        """The time of mixing and pouring beyond the pot life; 0 if it is long enough."""
+        """The time of mixing and pouring beyond the pot life; 0 if it is long enough, or not known."""
+        if self.pot_min is None:
+            return 0.0
         bubbles = DEGASSING_MIN if self.vacuum else self.rest_min
         return max(MIXING_MIN + pouring_min(self.cells) + bubbles - self.pot_min, 0.0)
 
@@ -238,20 +291,25 @@ class Batch:
                 "back. Let the air in slowly."
             )
         else:
-            allowed = WITHOUT_VACUUM * self.pot_min
-            said = (
-                f"No vacuum: a bubble of {number(BUBBLE_MM, 3)} mm rises through {number(self.step.rim, 3)} mm in "
-                f"{number(self.rise_min, 2)} min at best (Stokes), and {number(allowed, 2)} min, a quarter of the pot "
-                "life, are allowed. "
-            )
+            rise, pot = self.rise_min, self.pot_min
             where = "stand the syringe up, its tip up," if lid else "leave the mould alone"
             brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
-            stand = f"{where} for {number(allowed, 2)} min, push out the air, and inject slowly"
-            said += (
-                f"Such bubbles stay: get a vacuum, or {stand if lid else brush}."
-                if self.bubbles_stay
-                else f"Such bubbles should rise out: {where} for {number(self.rise_min, 2)} min."
-            )
+            wait = "a quarter of the pot life" if pot is None else f"{number(WITHOUT_VACUUM * pot, 2)} min"
+            stand = f"{where} for {wait}, push out the air, and inject slowly"
+            way_out = f"get a vacuum, or {stand if lid else brush}"
+            if rise is None or pot is None:
+                lacks = join_words(self.unknown)
+                said = f"No vacuum, and no source gives the {lacks}, so bubbles may stay: {way_out}."
+            else:
+                said = (
+                    f"No vacuum: a bubble of {number(BUBBLE_MM, 3)} mm rises through {number(self.step.rim, 3)} mm in "
+                    f"{number(rise, 2)} min at best (Stokes), and {wait}, a quarter of the pot life, are allowed. "
+                )
+                said += (
+                    f"Such bubbles stay: {way_out}."
+                    if self.bubbles_stay
+                    else f"Such bubbles should rise out: {where} for {number(rise, 2)} min."
+                )
         if not self.over_pot_life_min:
             return said
         over = number(self.over_pot_life_min, 2)
@@ -273,7 +331,9 @@ class Batch:
         more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
         held_back = f"net, and {number(HELD_BACK_ML, 2)} ml that tip and plunger keep (assumed)"
         stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic"
-        ratio = f"mix ratio, {source_text(silicone.mix_ratio)}"
+        ratio = f"mix ratio, {source_text(for_casting(silicone, 'mix_ratio'))}"
+        cure = source_text(for_casting(silicone, "cure_h"))
+        pot, viscosity = silicone.pot_life_min, silicone.mixed_viscosity_cps
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
@@ -285,16 +345,16 @@ class Batch:
             ("part A", mix.part_a_g, "g", ratio),
             ("part B", mix.part_b_g, "g", ratio),
             ("scale's error on a part", mix.mix_error_pct, "%", digit),
-            ("pot life in this room", self.pot_min, "min", by_temperature + source_text(silicone.pot_life_min)),
+            pot and ("pot life in this room", self.pot_min, "min", by_temperature + source_text(pot)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),
-            ("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", source_text(silicone.mixed_viscosity_cps)),
+            viscosity and ("viscosity, mixed", float(viscosity), "cps", source_text(viscosity)),
             ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
-            (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
+            viscosity and (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
             self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
-            ("cure in this room", self.cure_h, "h", by_temperature + source_text(silicone.cure_h)),
+            ("cure in this room", self.cure_h, "h", by_temperature + cure),
         )
         return tuple(Figure(*row) for row in rows if isinstance(row, tuple))
 

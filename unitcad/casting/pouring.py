@@ -23,10 +23,12 @@ from unitcad.casting.figures import (
     WEIGH_MIN,
     AfterPours,
     Batch,
-    at_room,
+    cure_hours,
     eccentricity,
+    for_casting,
     in_room,
     other_rooms,
+    pot_life,
     pouring_min,
     unit_heights,
     window_length,
@@ -283,7 +285,7 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
 
 def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
-    mix, larger, room = batch.mix, "", batch.moulds.spec.casting.room_c
+    mix, pot, larger, room = batch.mix, batch.pot_min, "", batch.moulds.spec.casting.room_c
     if mix.mix_error_pct > MOST_ERROR_PCT:
         enough = number(mix.mix_g * mix.mix_error_pct / MOST_ERROR_PCT, 3)
         error = number(mix.mix_error_pct, 2)
@@ -295,10 +297,11 @@ def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
         kind="weigh",
         minutes=WEIGH_MIN,
     )
+    lasts = "The pot life, which its data sheet has," if pot is None else f"The pot life of {in_room(pot, 'min', room)}"
     yield BenchStep(
         "Mix",
-        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
-        f"{in_room(batch.pot_min, 'min', room)} runs from now. {other_rooms(room)} Keep the mixing cup.",
+        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. {lasts} runs from "
+        f"now. {other_rooms(room)} Keep the mixing cup.",
         kind="mix",
         minutes=MIXING_MIN,
     )
@@ -376,11 +379,14 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
     cup, removed = spaced(last.cup), {removal.piece for removal in last.removals}
     if plan.of_kind("filament"):
         each = "the" if cells == 1 else "each"
-        tear = float(first.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
+        torn = ""
+        if first.tensile_mpa:
+            tear = float(first.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
+            torn = f": {number(tear, 2)} N tear {first.name} (computed)"
         yield BenchStep(
             "Filament out",
             f"Lift the mould off the bench. Pull {each} filament out downwards, by its bent end: it lets air in under "
-            f"the unit. Never push it through: {number(tear, 2)} N tear {first.name} (computed).",
+            f"the unit. Never push it through{torn}.",
             picture_path("filament-out"),
             minutes=PULL_MIN * cells,
         )
@@ -442,7 +448,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     ring = next((fitting for fitting in steps if fitting.mixed), None)
     if ring:
         silicone = _of_layer(silicones, ring.silicone)
-        hours = at_room(float(silicone.cure_h), casting.room_c)
+        hours = cure_hours(silicone, casting.room_c)
         what, said = ring.mixed, f"{silicone.name} cures {in_room(hours, 'h', casting.room_c)}."
     elif any(ADHESIVE in fitting.required_tools for fitting in steps):
         what, hours = "adhesive", ADHESIVE_CURE_H
@@ -465,7 +471,7 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
     if not film:
         return
     blade = "the blade" if moulds.plan.of_kind("blade") else "a straight edge"
-    hours = at_room(float(film.silicone.cure_h), spec.casting.room_c)
+    hours = cure_hours(film.silicone, spec.casting.room_c)
     yield from _mixed_later(film, spec)
     yield BenchStep(
         "Fill the skin tray",
@@ -495,14 +501,19 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
 
 def _mixed_later(mix: AfterPours, spec: Spec) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix after the pours; the bench page has no fields for it."""
-    ratio = float(mix.silicone.mix_ratio)
+    ratio = float(for_casting(mix.silicone, "mix_ratio"))
     part_b = mix.grams / (1 + ratio)
-    pot_min = at_room(float(mix.silicone.pot_life_min), spec.casting.room_c)
+    pot_min = pot_life(mix.silicone, spec.casting.room_c)
+    lasts = (
+        "pot life as on its data sheet"
+        if pot_min is None
+        else f"pot life {in_room(pot_min, 'min', spec.casting.room_c)}"
+    )
     mixed = "Mix and degas" if spec.casting.vacuum else "Mix"
     yield BenchStep(
         f"Mix for the {mix.use}",
         f"Weigh {shown(mix.grams - part_b)} g of {mix.silicone.name} part A and {shown(part_b)} g of part B. "
-        f"{mixed} as for a pour; pot life {in_room(pot_min, 'min', spec.casting.room_c)}.",
+        f"{mixed} as for a pour; {lasts}.",
         minutes=WEIGH_MIN + MIXING_MIN + (DEGASSING_MIN if spec.casting.vacuum else 0.0),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from unitcad.casting.figures import (
@@ -11,14 +11,14 @@ from unitcad.casting.figures import (
     FDM_ERROR,
     MIXING_MIN,
     WEIGH_MIN,
-    at_room,
+    cure_hours,
     in_room,
     print_min,
 )
 from unitcad.casting.plates import made_pieces, mould_plates
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import picture_path
-from unitcad.catalogue import Material
+from unitcad.catalogue import Material, inhibitors
 from unitcad.designs.limits import leaf_mm
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH
 from unitcad.moulds.cup import ribs, window_section
@@ -255,19 +255,27 @@ def level(text: str, tool: str) -> BenchStep:
     return BenchStep("Level the bench", text, minutes=5.0, required_tools=(tool, "paper"))
 
 
+def kept_away(silicones: Iterable[Material]) -> str:
+    """Return the sentence on surfaces that keep these silicones from curing; empty if none is known."""
+    surfaces = inhibitors(silicones)
+    return f" Keep {join_words(surfaces)} away from them: this silicone does not cure there." if surfaces else ""
+
+
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
-    """Describe how printed pieces get clean; `silicones` are those that a resin may keep from curing."""
+    """Describe how printed pieces get clean; `silicones` are those that a surface may keep from curing."""
     if not in_resin(moulds):
         yield BenchStep(
             "Clean",
-            "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches.",
+            "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches."
+            f"{kept_away(silicones)}",
             minutes=10.0,
             required_tools=("hand brush", "sharp knife"),
         )
         return
     yield BenchStep(
         "Wash",
-        "Wash the pieces in isopropanol, holes too, until nothing feels slippery. Dry them until no spot is dark.",
+        "Wash the pieces in isopropanol, holes too, until nothing feels slippery. Dry them until no spot is dark."
+        f"{kept_away(silicones)}",
         kind="rest",
         minutes=15.0,
         wait_min=30.0,
@@ -295,7 +303,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         required_tools=("oven", "curing lamp"),
     )
     room = moulds.spec.casting.room_c
-    drops = {each.name: at_room(float(each.cure_h), room) for each in silicones}
+    drops = {each.name: cure_hours(each, room) for each in silicones}
     each = ", ".join(f"{name} {in_room(hours, 'h', room)}" for name, hours in drops.items())
     yield BenchStep(
         "Test the cure",

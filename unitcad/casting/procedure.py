@@ -29,7 +29,8 @@ from unitcad.validation import warnings
 class Pour:
     """One pour: its figures, the verdict on bubbles, the steps, and the drawing of it assembled.
 
-    Times are those of the room. `drawing` is the section, each step's picture is in 3D.
+    Times are those of the room. `drawing` is the section, each step's picture is in 3D. `unknown`: the values that no
+    source gives.
     """
 
     index: int
@@ -39,9 +40,10 @@ class Pour:
     verdict: str
     bubbles_stay: bool
     over_pot_life_min: float
+    unknown: tuple[str, ...]
     part_a_g: float
     part_b_g: float
-    pot_life_min: float
+    pot_life_min: float | None
     cure_h: float
     steps: tuple[BenchStep, ...]
     drawing: str
@@ -91,6 +93,7 @@ def pour_of(batch: Batch, steps: Iterable[BenchStep]) -> Pour:
         verdict=batch.verdict,
         bubbles_stay=batch.bubbles_stay,
         over_pot_life_min=batch.over_pot_life_min,
+        unknown=batch.unknown,
         part_a_g=batch.mix.part_a_g,
         part_b_g=batch.mix.part_b_g,
         pot_life_min=batch.pot_min,

@@ -159,7 +159,7 @@ def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
 
 
 def pour_warnings(pours: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the faults of pours, as casting.json has them: bubbles that stay, a pot life that is too short."""
+    """Yield the faults of pours, as casting.json has them: bubbles that stay, a pot life too short, values unknown."""
     for wrong, words in (
         ([pour for pour in pours if pour["bubbles_stay"]], "without a vacuum bubbles stay in"),
         ([pour for pour in pours if pour["over_pot_life_min"] > 0], "mixing and pouring outlast the pot life in"),
@@ -167,3 +167,7 @@ def pour_warnings(pours: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         if wrong:
             named = join_words([f"pour {pour['index']} ({pour['material']})" for pour in wrong])
             yield f"{words} {named}; casting.md says what to do"
+    for pour in pours:
+        if pour["unknown"]:
+            lacks = join_words(pour["unknown"])
+            yield f"no source gives the {lacks} of {pour['material']}, pour {pour['index']}: read its data sheet"

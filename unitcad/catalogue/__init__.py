@@ -15,7 +15,7 @@ Examples
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Any, TypeVar
@@ -24,7 +24,9 @@ import msgspec
 from msgspec import Struct
 
 from unitcad.catalogue.entries import (
+    CHEMISTRIES,
     FREQUENCIES_HZ,
+    Contact,
     Material,
     MaterialEntry,
     Measurements,
@@ -42,6 +44,7 @@ from unitcad.errors import Refusal, unknown_name
 
 __all__ = [
     "FREQUENCIES_HZ",
+    "Contact",
     "Material",
     "MaterialEntry",
     "Measurements",
@@ -53,9 +56,13 @@ __all__ = [
     "TissueEntry",
     "Value",
     "choose",
+    "contact",
+    "contacts",
+    "inhibitors",
     "materials",
     "measurements",
     "motors",
+    "needed",
     "printers",
     "tissue",
 ]
@@ -205,6 +212,48 @@ def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:
     if name not in known:
         raise unknown_name(kind, name, known)
     return known[name]
+
+
+@cache
+def contacts() -> tuple[Contact, ...]:
+    """Return the pairs of a fresh silicone and a surface of which a source is known.
+
+    Examples
+    --------
+    >>> from unitcad import catalogue
+    >>> [one.on for one in catalogue.contacts() if one.poured == "tin" and one.result == "inhibited"]
+    ['platinum', 'sulphur clay']
+    """
+    return msgspec.convert(_raw("compatibility.toml")["contacts"], tuple[Contact, ...])
+
+
+def contact(poured: Material, on: Material) -> Contact | None:
+    """Return what a fresh silicone does on a cured one; None if no source says, or a chemistry is not known."""
+    if poured.chemistry is None or on.chemistry is None:
+        return None
+    pair = poured.chemistry.value, on.chemistry.value
+    return next((one for one in contacts() if (one.poured, one.on) == pair), None)
+
+
+def inhibitors(silicones: Iterable[Material]) -> tuple[str, ...]:
+    """Return the surfaces, other than silicones, on which one of these silicones does not cure."""
+    chemistries = {each.chemistry.value for each in silicones if each.chemistry}
+    found = [one for one in contacts() if one.result == "inhibited" and one.on not in CHEMISTRIES]
+    return tuple(dict.fromkeys(one.on for one in found if one.poured in chemistries))
+
+
+def needed(material: Material, key: str, use: str) -> Value[float]:
+    """Return a value that a use can't do without; `use`: its subject, such as "casting".
+
+    Raises `Refusal` if no source gives the value.
+    """
+    value: Value[float] | None = getattr(material, key)
+    if value is None:
+        raise Refusal(f"materials.{material.name}.{key}", None, f"no source gives it, and {use} needs it; {_OWN_ENTRY}")
+    return value
+
+
+_OWN_ENTRY = "give it in an entry of your own that is like this one"
 
 
 def _entries(kind: type[_Entry], own: Mapping[str, Struct] | None) -> dict[str, _Entry]:

@@ -84,8 +84,23 @@ class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defau
         return float(self.value)  # type: ignore[arg-type]
 
 
+Chemistry = Annotated[
+    Literal["platinum", "tin"],
+    Meta(description="catalyst of the cure: platinum (addition) or tin (condensation)"),
+]
+CHEMISTRIES = "platinum", "tin"
+_FLOOR = Value(1.0, "assumed", "usual least wall for a hand-poured silicone; about 1 mm for Ecoflex 00-30")
+_INCOMPRESSIBLE = Value(
+    0.4999, "assumed", "bulk modulus about 1.2 GPa against a shear modulus below 0.3 MPa", low=0.4999, high=0.5
+)
+_LOSSY = Value(0.2, "assumed", "tan delta of soft silicones at 100 to 150 Hz", low=0.1, high=0.3)
+
+
 class Material(Struct, frozen=True, kw_only=True):
     """A castable silicone. Times are at 23 °C.
+
+    Only its density is required; three values are assumed for every silicone that has no better ones. A value that no
+    source gives is absent, and what needs it says so (`needed`).
 
     Examples
     --------
@@ -98,18 +113,21 @@ class Material(Struct, frozen=True, kw_only=True):
 
     name: str
     density_g_cm3: Value[Annotated[float, between(0.1, 25, "density of the cured silicone")]]
-    mixed_viscosity_cps: Value[Annotated[float, between(1, 1e8, "viscosity of both parts mixed")]]
-    pot_life_min: Value[Annotated[float, between(0.1, 1e5, "time from mixing until the mix no longer flows")]]
-    cure_h: Value[Annotated[float, between(0.01, 1e4, "time from pouring until demoulding")]]
-    shore: Value[Annotated[str, Meta(min_length=1, max_length=20, description="hardness on the data sheet")]]
-    modulus_100pct_kpa: Value[Annotated[float, between(0.1, 1e6, "stress at 100 % strain, slowly pulled")]]
-    tensile_mpa: Value[Annotated[float, between(0.001, 1000, "tensile strength")]]
-    elongation_pct: Value[Annotated[float, between(1, 5000, "elongation at break")]]
-    casting_floor_mm: Value[Annotated[float, between(0.01, 100, "thinnest wall that pours and demoulds")]]
-    poisson_ratio: Value[Poisson]
-    loss_factor: Value[LossFactor]
-    mix_ratio: Value[Annotated[float, between(0.001, 1000, "parts A to one part B")]]
+    casting_floor_mm: Value[Annotated[float, between(0.01, 100, "thinnest wall that pours and demoulds")]] = _FLOOR
+    poisson_ratio: Value[Poisson] = _INCOMPRESSIBLE
+    loss_factor: Value[LossFactor] = _LOSSY
+    chemistry: Value[Chemistry] | None = None
+    mix_ratio: Value[Annotated[float, between(0.001, 1000, "parts A to one part B, by weight")]] | None = None
+    mixed_viscosity_cps: Value[Annotated[float, between(1, 1e8, "viscosity of both parts mixed")]] | None = None
+    pot_life_min: Value[Annotated[float, between(0.1, 1e5, "time from mixing until it no longer flows")]] | None = None
+    cure_h: Value[Annotated[float, between(0.01, 1e4, "time from pouring until demoulding")]] | None = None
+    shore: Value[Annotated[str, Meta(min_length=1, max_length=20, description="hardness on the data sheet")]] | None = (
+        None
+    )
     shrinkage_percent: Value[Shrinkage] | None = None
+    tensile_mpa: Value[Annotated[float, between(0.001, 1000, "tensile strength")]] | None = None
+    elongation_pct: Value[Annotated[float, between(1, 5000, "elongation at break")]] | None = None
+    modulus_100pct_kpa: Value[Annotated[float, between(0.1, 1e6, "stress at 100 % strain, static")]] | None = None
     youngs_modulus_kpa: Value[Young] | None = None
     quasistatic_modulus_kpa: Value[Annotated[float, between(0.01, 1e8, "Young's modulus of a slow pull")]] | None = None
     fractional_mu0_kpa: (
@@ -117,6 +135,20 @@ class Material(Struct, frozen=True, kw_only=True):
     ) = None
     fractional_tau_us: Value[Annotated[float, between(0, 1e9, "time constant of a fractional law")]] | None = None
     fractional_n: Value[Annotated[float, between(0, 1, "order of a fractional law")]] | None = None
+
+
+class Contact(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a fresh silicone does on a surface: `on` is the chemistry of a cured silicone, or another surface.
+
+    "inhibited": it stays tacky or liquid next to the surface. `remedy`: a treatment on which it cures.
+    """
+
+    poured: Chemistry
+    on: Annotated[str, Meta(min_length=1)]
+    result: Literal["bonds", "inhibited"]
+    status: Status
+    source: Source
+    remedy: str | None = None
 
 
 class Motor(Struct, frozen=True, kw_only=True):
@@ -242,18 +274,19 @@ if TYPE_CHECKING:
         status: Status | None = None
         source: str | None = None
         density_g_cm3: _Number = None
+        casting_floor_mm: _Number = None
+        poisson_ratio: _Number = None
+        loss_factor: _Number = None
+        chemistry: str | Value[str] | None = None
+        mix_ratio: _Number = None
         mixed_viscosity_cps: _Number = None
         pot_life_min: _Number = None
         cure_h: _Number = None
         shore: str | Value[str] | None = None
-        modulus_100pct_kpa: _Number = None
+        shrinkage_percent: _Number = None
         tensile_mpa: _Number = None
         elongation_pct: _Number = None
-        casting_floor_mm: _Number = None
-        poisson_ratio: _Number = None
-        loss_factor: _Number = None
-        mix_ratio: _Number = None
-        shrinkage_percent: _Number = None
+        modulus_100pct_kpa: _Number = None
         youngs_modulus_kpa: _Number = None
         quasistatic_modulus_kpa: _Number = None
         fractional_mu0_kpa: _Number = None

@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from unitcad import catalogue
-from unitcad.catalogue import Material, Printer
+from unitcad.catalogue import Material, Printer, needed
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Exit
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
@@ -23,8 +23,12 @@ from unitcad.spec.raw import LEAST_LEDGE, FpcbTable, WiresTable
 
 
 def allowed_strain(spec: Spec, known: Mapping[str, Material]) -> float:
-    """Return the margin's part of the least elongation at break among the layers (1 = 100 %)."""
-    least = min(float(known[layer.material].elongation_pct) for layer in spec.layers)
+    """Return the margin's part of the least elongation at break among the layers (1 = 100 %).
+
+    Raises Refusal for a layer whose elongation is not known.
+    """
+    by_layer = (needed(known[layer.material], "elongation_pct", "a limit of stretch") for layer in spec.layers)
+    least = min(map(float, by_layer))
     return spec.casting.strain_margin * least / 100
 
 

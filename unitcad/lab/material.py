@@ -442,7 +442,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
         warnings.append("specimens: one curve: the scatter of specimens is not in the range")
     if ratio > MOST_SCATTER:
         warnings.append(f"scatter: the specimens differ by a factor of {ratio:.3g}: look for an odd one")
-    if sheet:
+    if sheet and sheet.modulus_100pct_kpa:
         off = chosen.value / 1e3 / float(sheet.modulus_100pct_kpa)
         if not 1 / MOST_OF_SHEET <= off <= MOST_OF_SHEET:
             of = f"the 100 % modulus of {sheet.name}, {float(sheet.modulus_100pct_kpa):g} kPa"

@@ -13,7 +13,7 @@ import typer
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN
+from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, for_casting
 from unitcad.catalogue import printers
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Out
@@ -63,7 +63,7 @@ def pours(phantom: PhantomSet) -> list[PhantomPour]:
         box = volume * one.density_g_cm3 / 1e3
         total = box * (1 + phantom.table.waste)
         silicone = total * 100.0 / (100.0 + layer.thinner_pct)
-        part_b = silicone / (1 + float(one.silicone.mix_ratio))
+        part_b = silicone / (1 + float(for_casting(one.silicone, "mix_ratio")))
         found.insert(0, PhantomPour(layer, one, silicone - part_b, part_b, total - silicone, box / layer.thickness_mm))
     return found
 
@@ -76,7 +76,8 @@ def casting_markdown(phantom: PhantomSet) -> str:
         edge = f"frame {i}, {p.layer.thickness_mm:g} mm" if i > 1 else f"the tray's rim, {p.layer.thickness_mm:g} mm"
         grams = f"{p.part_a_g:.1f}", f"{p.part_b_g:.1f}", f"{p.thinner_g:.1f}"
         silicone = p.recipe.silicone
-        hours = f"{float(silicone.pot_life_min):.3g}", f"{float(silicone.cure_h):.3g}"
+        times = silicone.pot_life_min, silicone.cure_h
+        hours = ["not known" if time is None else f"{float(time):.3g}" for time in times]
         figures.append((f"{i}", p.layer.name, edge, silicone.name, *grams, *hours, f"{p.grams_per_mm:.2f}"))
     sections = {
         "Recipe": [*_recipe(phantom), "", *_moduli(phantom)],

@@ -20,6 +20,7 @@ from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded_layered
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
+from unitcad.casting.figures import check_castable
 from unitcad.casting.procedure import procedure
 from unitcad.casting.procedure_text import files as written
 from unitcad.catalogue import Printer
@@ -155,7 +156,7 @@ class Subject:
         spec, outputs = self.unit, possible_outputs(self.unit, only)
         moulds = MouldSet(spec, given=self.given)
         if {"moulds", "casting"} & set(outputs):
-            moulds.plan  # noqa: B018  # refuses before the long work begins
+            check_castable(moulds)  # refuses before the long work begins
         own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}
         optional = OptionalFiles()
         if "pdf" in spec.output.formats and {"unit", "moulds"} & set(outputs):  # its names are the spec's own

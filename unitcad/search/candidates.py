@@ -19,7 +19,7 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.measured import FIELDS, stack_inputs
 from unitcad.attenuation.edge.ranges import Predictive, lead_of
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
-from unitcad.casting.figures import at_room
+from unitcad.casting.figures import cure_hours, not_castable
 from unitcad.casting.procedure import procedure
 from unitcad.designs import dimensions
 from unitcad.designs import shipped as designs
@@ -68,7 +68,8 @@ class Candidates:
 
     mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or at touching
     units if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level; `novelty`: how many
-    of lengths, motor and frequency no measured unit had. skipped: silicones without a modulus, with the reason.
+    of lengths, motor and frequency no measured unit had. skipped: silicones without a modulus, or that can't be cast,
+    with the reason.
     refused: the reasons why lengths were refused, by design and field.
     """
 
@@ -159,7 +160,9 @@ def spec_data(target: Target, lengths: Lengths, materials: Sequence[str], name: 
 
 def geometry_of(target: Target, lengths: Lengths) -> Geometry:
     """Return the geometry of lengths. Raises Refusal if the design does not accept them."""
-    spec = from_data(spec_data(target, lengths, (target.materials[0],) * len(lengths.walls)))
+    known = catalogue.materials(target.asked.materials)
+    some_silicone = next((name for name in target.materials if not not_castable(known[name])), target.materials[0])
+    spec = from_data(spec_data(target, lengths, (some_silicone,) * len(lengths.walls)))
     return Geometry(lengths, spec, drawn_input(spec))
 
 
@@ -228,21 +231,35 @@ def silicones_of(target: Target, frequency: Quantity) -> tuple[dict[str, Silicon
     """
     entries, known, skipped = catalogue.materials(target.asked.materials), {}, {}
     for name in target.materials:
+        if lacks := not_castable(entries[name]):
+            skipped[name] = f"it can't be cast: no source gives its {join_words(lacks)}"
+            continue
         layer = silicone_layer(entries[name], 1e-3, frequency, target.asked.estimate.moduli == "quasi-static")
         if layer.youngs_modulus.value is None:
             skipped[name] = layer.youngs_modulus.note
         else:
             known[name] = layer
     if not known:
-        limit = f"no level can be estimated: {next(iter(skipped.values()))}"
+        name, why = next(iter(skipped.items()))
+        limit = f"none can be tried: {name}: {why}"
         raise Refusal("at_hand.materials", list(target.materials), limit)
     return known, skipped
 
 
-def sequences_of(materials: Sequence[str], count: int) -> list[tuple[str, ...]]:
-    """Return the silicones of `count` layers, neighbours different: two layers of one silicone are one layer."""
+def sequences_of(
+    materials: Sequence[str], count: int, entries: Mapping[str, catalogue.Material]
+) -> list[tuple[str, ...]]:
+    """Return the silicones of `count` layers: each cures on the one inside it, and is another one.
+
+    Two layers of one silicone are one layer.
+    """
+
+    def cures(on: str, poured: str) -> bool:
+        found = catalogue.contact(entries[poured], entries[on])
+        return on != poured and (found is None or found.result == "bonds")
+
     every = itertools.product(materials, repeat=count)
-    return [one for one in every if all(a != b for a, b in itertools.pairwise(one))]
+    return [one for one in every if all(itertools.starmap(cures, itertools.pairwise(one)))]
 
 
 def tabulate(
@@ -256,13 +273,14 @@ def tabulate(
     Raises Refusal for too many, and if there is none.
     """
     counts = np.array([len(one.lengths.walls) for one in made])
-    by_count = {int(n): sequences_of(list(silicones), int(n)) for n in np.unique(counts)}
+    entries, room_c = catalogue.materials(made[0].spec.materials), made[0].spec.casting.room_c
+    by_count = {int(n): sequences_of(list(silicones), int(n), entries) for n in np.unique(counts)}
     total = sum(len(by_count[n]) for n in counts.tolist())
     if total > MOST_CANDIDATES:
         step, limit = target.asked.vary.step_mm, f"makes {total} candidates; at most {MOST_CANDIDATES}"
         raise Refusal("vary.step_mm", step, limit, 2 * step)
     if not total:
-        limit = "has one silicone with a modulus, and neighbouring layers differ: vary one layer"
+        limit = "has no two silicones with a modulus of which one cures on the other: vary one layer"
         raise Refusal("at_hand.materials", list(target.materials), limit)
     say(f"{total} candidates")
     sequences = [one for n in by_count for one in by_count[n]]
@@ -282,7 +300,6 @@ def tabulate(
     predictive = replace(
         parts[0][4], **{end: np.concatenate([getattr(part[4], end) for part in parts]) for end in ends}
     )
-    entries, room_c = catalogue.materials(made[0].spec.materials), made[0].spec.casting.room_c
     cures = np.array([_cure_hours(one, entries, room_c) for one in sequences])
     say("crosstalk")
     return Candidates(
@@ -350,7 +367,7 @@ def finish_hours(spec: Spec) -> float:
 
 def _cure_hours(names: Iterable[str], entries: Mapping[str, catalogue.Material], room_c: float) -> float:
     """Return the hours that layers of these silicones cure, one after the other, at the room's temperature."""
-    return sum(at_room(float(entries[name].cure_h), room_c) for name in names)
+    return sum(cure_hours(entries[name], room_c) for name in names)
 
 
 def _by_key(
@@ -465,7 +482,7 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
     rows = np.arange(found.count)  # of equally near ones, the one with the fewest unmeasured inputs
     row = int(np.lexsort((rows, found.novelty, np.round(far.sum(axis=0), 9)))[0])
     none = f"none of {found.count} candidates meets it" + (" and the rest" if len(asked) > 1 else "")
-    left_out = f"; not tried, without a modulus: {some(found.skipped)}" if found.skipped else ""
+    left_out = f"; not tried: {some(found.skipped)}" if found.skipped else ""
     offers = {limit.key: (limit.asked, limit.offer(row)) for i, limit in enumerate(asked) if missed[i, row]}
     made = []
     for key, (value, offer) in offers.items():

@@ -22,7 +22,7 @@ from unitcad.report.html_page import drawing, plain_page
 from unitcad.search.candidates import Say, limits
 from unitcad.search.proposals import Inversion, name_of, order_rows
 from unitcad.spec import to_toml
-from unitcad.text import cell, join_words, number
+from unitcad.text import cell, join_words, number, some
 
 _GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
@@ -63,10 +63,24 @@ def head_lines(data: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _skipped(skipped: Mapping[str, str]) -> list[str]:
+    """Return a line for each silicone, or for each kind of reason if there are many."""
+    if len(skipped) <= _MOST_SKIPPED:
+        return [f"skipped, {name}: {why}" for name, why in skipped.items()]
+    by_reason: dict[str, list[str]] = {}
+    for name, why in skipped.items():
+        by_reason.setdefault(re.split("[;:,]", why)[0], []).append(name)
+    return [f"skipped, {some(names)}: {why}" for why, names in by_reason.items()]
+
+
+_MOST_SKIPPED = 5
+"""Silicones that are skipped with a line for each."""
+
+
 def skipped_lines(data: Mapping[str, Any]) -> list[str]:
     """Return a line for each silicone that is skipped, and for each candidate that can't be cast."""
     return [
-        *(f"skipped, {name}: {why}" for name, why in data["skipped"].items()),
+        *_skipped(data["skipped"]),
         *(f"can't be cast, {one['candidate']}: {'; '.join(one['failed'])}" for one in data["not_castable"]),
     ]
 

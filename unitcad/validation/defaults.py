@@ -6,6 +6,7 @@ import math
 import tomllib
 from functools import lru_cache
 from importlib.util import find_spec
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
@@ -237,7 +238,7 @@ def warnings(spec: Spec, estimate: bool = True) -> list[str]:
 
     Without `estimate` those are left out that concern only the estimate.
     """
-    design, found = design_of(spec), [*_thin_layers(spec), *_leads(spec), *_roof(spec)]
+    design, found = design_of(spec), [*_thin_layers(spec), *_bonds(spec), *_leads(spec), *_roof(spec)]
     if estimate:
         unmeasured = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
         found += [
@@ -265,6 +266,27 @@ def _thin_layers(spec: Spec) -> list[str]:
     return sentences
 
 
+def _bonds(spec: Spec) -> list[str]:
+    """Warn of a layer that won't cure on the layer that it is poured on, or of which no source says that it bonds."""
+    known, sentences = catalogue.materials(spec.materials), []
+    for i, (on, poured) in enumerate(pairwise(layer.material for layer in spec.layers), 1):
+        fresh, cured = known[poured], known[on]
+        if poured == on or fresh.chemistry is None or cured.chemistry is None:
+            continue
+        found, chemistries = catalogue.contact(fresh, cured), f"{fresh.chemistry.value} on {cured.chemistry.value}"
+        if found is None:
+            sentences.append(
+                f"layers.{i}.material = {poured!r}: no source says whether it bonds to {on} ({chemistries}); cast a "
+                "test piece first"
+            )
+        elif found.result == "inhibited":
+            sentences.append(
+                f"layers.{i}.material = {poured!r} won't cure on {on} ({chemistries}; {found.source}); take both of "
+                "one chemistry"
+            )
+    return sentences
+
+
 def _leads(spec: Spec) -> list[str]:
     drawn = is_body_file(spec.design)
     if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn):
@@ -278,7 +300,7 @@ def _roof(spec: Spec) -> list[str]:
     if not design_of(spec).caps or spec.motor.fill or spec.motor.absent:
         return []
     dims, close, found = design_of(spec).dimensions(spec), "motor.fill = true closes the ring", list[str]()
-    sag, hertz = roof(spec)
+    sag, hertz = roof(spec) or (0.0, math.inf)
     if hertz < spec.estimate.frequency_hz:
         spans = f"caps of {sum(layer.cap_mm for layer in spec.layers):g} mm span {2 * dims.cavity_radius:g} mm of air"
         tuned = f"the motor on them resonates near {number(hertz, 2)} Hz, below its {spec.estimate.frequency_hz:g} Hz"
@@ -291,8 +313,10 @@ def _roof(spec: Spec) -> list[str]:
     return found
 
 
-def roof(spec: Spec) -> tuple[float, float]:
+def roof(spec: Spec) -> tuple[float, float] | None:
     """Return how far a unit's caps sag (mm), and the resonance of the motor that hangs on them (Hz).
+
+    None if no modulus of a layer is known.
 
     A laminated plate is clamped at the cavity's wall. Its own weight and a stiff disc of the motor's size pull it down.
     Source: Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 1959, chapter 3. Moduli are static.
@@ -300,9 +324,13 @@ def roof(spec: Spec) -> tuple[float, float]:
     dims, known = design_of(spec).dimensions(spec), catalogue.materials(spec.materials)
     silicones = [known[layer.material] for layer in spec.layers]
     thick = [layer.cap_mm / 1000 for layer in spec.layers]
+    moduli = [each.quasistatic_modulus_kpa or each.modulus_100pct_kpa or each.youngs_modulus_kpa for each in silicones]
+    known_moduli = [float(modulus) for modulus in moduli if modulus]
+    if len(known_moduli) < len(silicones):
+        return None
     stiff = [
-        1000 * float(each.quasistatic_modulus_kpa or each.modulus_100pct_kpa) / (1 - float(each.poisson_ratio) ** 2)
-        for each in silicones
+        1000 * modulus / (1 - float(each.poisson_ratio) ** 2)
+        for modulus, each in zip(known_moduli, silicones, strict=True)
     ]
     middles = [sum(thick[:i]) + thick[i] / 2 for i in range(len(thick))]
     plies = list(zip(stiff, thick, middles, strict=True))

@@ -125,7 +125,7 @@
         field(`p${pour.index}.b`, `Part B weighed (${number(pour.part_b_g, 3)} g asked)`, "g", "grams")), partB);
       weigh();
     }
-    if (step.kind === "mix") own.push(timer(`p${pour.index}.mix`, "pot life", pour.pot_life_min));
+    if (step.kind === "mix" && pour.pot_life_min) own.push(timer(`p${pour.index}.mix`, "pot life", pour.pot_life_min));
     if (step.kind === "rest" && step.wait_min) own.push(timer(`s${at}`, "wait", step.minutes + step.wait_min));
     if (step.kind === "cure") own.push(timer(pour ? `p${pour.index}.cure` : `s${at}`, "cure", step.wait_min));
     const ticked = el("input", { type: "checkbox", checked: Boolean(state.done[at]), "aria-label": `Step ${at + 1} done`, onchange: () => {
