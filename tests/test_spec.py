@@ -1,5 +1,6 @@
 """Validation: what is refused, with field, value, limit and a nearest value that is accepted."""
 
+import re
 import tomllib
 
 import pytest
@@ -129,7 +130,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(template, setting, field,
         ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),
-        ("motor.part='foo'", r"^motor\.part = 'foo': unknown name; known: HD-EMC1003-2, [^;]*$"),
+        ("motor.part='foo'", r"^motor\.part = 'foo': unknown name; known: .*HD-EMC1003-2 \(10 x 2\.7 mm\)"),
         ("design='d.py'", r"^design = 'd\.py': name the function or Design in that file: d\.py:NAME$"),
     ],
 )
@@ -154,10 +155,23 @@ def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are():
         load("encapsulating", ["xyz=1"])
     with pytest.raises(Refusal, match=r"unknown key; closest: wall_mm; nearest"):
         load("encapsulating", ["layers.0.walls_mm=1"])
-    with pytest.raises(Refusal, match=r"unknown key at the top; known: layers\.0\.wall_mm$"):
+    with pytest.raises(Refusal, match=r"unknown key; known: layers\.0\.wall_mm or layers\.1\.wall_mm$"):
         load("encapsulating", ["wall_mm=1"])
     with pytest.raises(Refusal, match=r"unknown key; skin_mm belongs above the first \[table\]$"):
         load("encapsulating", {"layers.1.skin_mm": 0.4})
+
+
+@pytest.mark.parametrize(
+    ("part", "first"),
+    [("LCM1020", "VC1018B001L"), ("LCM0820", "VC0820B006F"), ("8mm", "VC0820B006F"), ("lcm0720a3463", "LCM0720A3463F")],
+)
+def test_an_unknown_motor_is_answered_by_size(part, first):
+    with pytest.raises(Refusal) as refused:
+        load("encapsulating", {"motor.part": part})
+    known = re.findall(r"([\w-]+) \([\d.]+ x [\d.]+ mm\)", str(refused.value))
+    assert known[0] == first == refused.value.nearest
+    assert len(known) >= 6
+    assert "give diameter_mm and thickness_mm" in str(refused.value)
 
 
 def test_a_custom_design_without_its_text_is_refused():

@@ -9,9 +9,10 @@ import math
 import re
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 from urllib.parse import urlsplit
 
 from unitcad.text import some, toml
@@ -160,26 +161,68 @@ class WrongArgument(Refusal):
 
 
 class UnknownKey(Refusal):
-    """A key that its table does not have; `nearest` is the whole path of the closest one that it has."""
+    """A key that its table does not have; `nearest` is the whole path of the closest one that it has.
+
+    `meant`: every path that it may mean; `root`: its own path, if `field` goes on to the only value below it;
+    `settled`: the key was one of an earlier version, so nothing else is meant.
+    """
+
+    def __init__(
+        self,
+        field: str,
+        value: object,
+        limit: str,
+        nearest: object = None,
+        meant: tuple[str, ...] = (),
+        root: str = "",
+        settled: bool = False,
+    ) -> None:
+        super().__init__(field, value, limit, nearest)
+        self.meant, self.root, self.settled = meant, root or field, settled
+
+    def under(self, table: str) -> UnknownKey:
+        """Return the same refusal of a table that is below another one, `table`; "" for none."""
+        before = f"{table}." if table else ""
+        limit = self.limit
+        for path in sorted(self.meant, key=len, reverse=True):
+            limit = re.sub(rf"(?<![\w.]){re.escape(path)}\b", before + path, limit)
+        nearest = f"{before}{self.nearest}" if isinstance(self.nearest, str) else self.nearest
+        meant = tuple(before + path for path in self.meant)
+        return UnknownKey(before + self.field, self.value, limit, nearest, meant, before + self.root, self.settled)
 
 
 def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusal] = Refusal) -> Refusal:
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
     known = sorted(known)
     folded = {name.lower(): name for name in known}
+    within = [name for name in folded if len(value) >= _PART_OF_NAME and value.lower() in name]
+    within.sort(key=lambda name: (-SequenceMatcher(None, value.lower(), name).ratio(), name))
     close = [folded[name] for name in get_close_matches(value.lower(), folded, n=3, cutoff=0.6)]
+    close = [folded[name] for name in within] if 0 < len(within) <= _MOST_NAMES else close
     names = f"closest: {', '.join(close)}" if close else f"known: {some(known)}"
     return kind(field, value, f"unknown name; {names}", close[0] if close else None)
 
 
-def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:
+def unknown_key(
+    field: str,
+    value: object,
+    known: Iterable[str],
+    lists: str = "",
+    removed: Mapping[str, str] = MappingProxyType({}),
+) -> UnknownKey:
     """Return a refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
 
-    The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any.
+    The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any. `removed`:
+    for each key of an earlier version the key that took its place, or a sentence of what to do.
     """
     table, _, key = field.rpartition(".")
     known = list(known)
-    close = get_close_matches(key, known, n=len(known) or 1, cutoff=0.6)
+    if after := removed.get(key):
+        if after in known:
+            path = f"{table}.{after}" if table else after
+            return UnknownKey(field, value, f"unknown key; {after} took its place", path, settled=True)
+        return UnknownKey(field, value, f"unknown key; it went: {after}", settled=True)
+    close = get_close_matches(key, known, n=len(known) or 1, cutoff=_ALIKE)
     # Among equals the table's first: bed_x_mm before bed_z_mm.
     best = max(
         (name for name in known if name in close),
@@ -237,6 +280,10 @@ def _text(value: object) -> str:
         return f"a {type(value).__name__}"
 
 
+_PART_OF_NAME, _MOST_NAMES = 4, 10
+"""Characters of a text from which names that contain it are meant, and the number of these that are listed."""
+_ALIKE = 0.65
+"""Least likeness of a key with the one that is offered for it."""
 _MOST_KEYS = 5
 """Keys of a table that are named for one that it does not have."""
 _LONGEST = 200

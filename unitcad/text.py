@@ -99,6 +99,31 @@ def with_article(noun: str) -> str:
     return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
+_MEASURE = re.compile(r"\s*([-+]?\d*[.,]?\d+)\s*([A-Za-z%]*)\s*")
+_SCALES: dict[str, dict[str, float]] = {
+    "mm": {"cm": 10, "m": 1000, "um": 0.001, "in": 25.4},
+    "hz": {"khz": 1000},
+    "g": {"mg": 0.001, "kg": 1000},
+    "min": {"s": 1 / 60, "h": 60},
+    "h": {"min": 1 / 60, "d": 24},
+    "kpa": {"pa": 0.001, "mpa": 1000},
+}
+"""For a unit, others that are read in its place, and how many of it each is."""
+
+
+def measured(text: Any, unit: str) -> float | None:
+    """Return the number that a text means in a unit: 14.5 for "14,5", "14.5 mm" or "1.45 cm"; None if it means none."""
+    parts = _MEASURE.fullmatch(text) if isinstance(text, str) else None
+    if not parts:
+        return None
+    given = parts[2].lower()
+    scale = 1.0 if given in ("", unit) else _SCALES.get(unit, {}).get(given)
+    if scale is None:
+        return None
+    value = float(parts[1].replace(",", ".")) * scale
+    return int(value) if value.is_integer() else value if math.isfinite(value) else None
+
+
 def some(words: Iterable[object], most: int = 10) -> str:
     """Return the first words of a list, each cut at 60 characters, and the number of the others: "a, b and 7 more"."""
     every = list(words)

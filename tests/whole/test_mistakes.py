@@ -12,6 +12,7 @@ UNIT = 'name = "unit"\ndesign = "encapsulating"\ndiameter_mm = 14\n'
 LAYER = '[[layers]]\nmaterial = "{}"\nwall_mm = 1.25\ncap_mm = 1.25\n'
 GOOD = UNIT + LAYER.format("ecoflex-00-10") + LAYER.format("dragon-skin-30")
 SILICONES = ", ".join(materials())
+ECOFLEX = ", ".join(sorted(name for name in materials() if name.startswith("ecoflex")))
 CURVE = "Strain (%),Stress (kPa)\n" + "".join(f"{i}.5,{i}.5\n" for i in range(60))
 THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; nearest accepted: 12.2"
 
@@ -45,7 +46,32 @@ COMMANDS = {
     "build unit.toml --set diameter_mm=1.45cm": "diameter_mm = '1.45cm': takes a number; nearest accepted: 14.5",
     "build unit.toml --set diameter_mm=1.4": f"diameter_mm = 1.4: {THIN}",
     "build unit.toml --set diameter_mm=-14": f"diameter_mm = -14: must be at least 1, and {THIN}",
-    "build unit.toml --set wall_mm=2": "wall_mm = 2: unknown key at the top; known: layers.0.wall_mm",
+    "build unit.toml --set wall_mm=2": "wall_mm = 2: unknown key; known: layers.0.wall_mm or layers.1.wall_mm",
+    "build unit.toml --set wall=2": "wall = 2: unknown key; known: layers.0.wall_mm or layers.1.wall_mm",
+    "build unit.toml --set 'layers[0].wall_mm=2'": "layers[0].wall_mm = 2: unknown key; known: layers.0.wall_mm; "
+    "nearest accepted: 'layers.0.wall_mm'",
+    "build unit.toml --set layer.1.wall=2": "layer.1.wall = 2: unknown key; known: layers.1.wall_mm; "
+    "nearest accepted: 'layers.1.wall_mm'",
+    "build unit.toml --set layers.wall_mm=2": "layers.wall_mm = 2: wall_mm is a key of each entry: layers.0.wall_mm or "
+    "layers.1.wall_mm; Layer 1 is layers.0",
+    "build unit.toml --set material=Ecoflex": "material = 'Ecoflex': unknown key; known: layers.0.material or "
+    f"layers.1.material; layers.0.material = 'Ecoflex': unknown name; closest: {ECOFLEX}",
+    "build unit.toml --set layers.0.material=Ecoflex": "layers.0.material = 'Ecoflex': unknown name; closest: "
+    f"{ECOFLEX}; nearest accepted: '{ECOFLEX.partition(',')[0]}'",
+    "build unit.toml --set frequency=200Hz": "frequency = '200Hz': unknown key; known: estimate.frequency_hz; "
+    "estimate.frequency_hz = 200; nearest accepted: 'estimate.frequency_hz'",
+    "build unit.toml --set temperature=20": "temperature = 20: unknown key; known: casting.room_c; "
+    "nearest accepted: 'casting.room_c'",
+    "build wrist-band --set wall=2": "wall = 2: unknown key; known: unit.layers.0.wall_mm or unit.layers.1.wall_mm",
+    "build unit.toml --set estimate.stack=1": "estimate.stack = 1: unknown key; it went: the range is that of the "
+    "rule; leave it out",
+    "build wrist-band --set body.radius_mm=30": "body = { radius_mm = 30 }: unknown key; limb took its place; "
+    "nearest accepted: 'limb'",
+    "batch sweep.toml --set wall=2 --dry-run": "wall: unknown key; known: layers.0.wall_mm or layers.1.wall_mm",
+    "estimate unit.toml --frequency 0.2kHz": "--frequency = '0.2kHz': takes a number (HZ); nearest accepted: 200",
+    "build unit.toml -o /proc/x": "-o = '/proc/x': can't be written: no such file or directory",
+    "coupon fdm-0.4 --out=/proc/x/y": "--out = '/proc/x/y': can't be written: no such file or directory",
+    "schema -o /proc/x.json": "-o = '/proc/x.json': can't be written: no such file or directory",
     "build unit.toml --set layers.5.wall_mm=2": "layers.5.wall_mm = 2: no entry 5: the list has the entries 0 to 1; "
     "Layer 1 is layers.0",
     "build unit.toml --only mould": "--only = 'mould': unknown name; closest: moulds; nearest accepted: 'moulds'",
@@ -62,7 +88,8 @@ COMMANDS = {
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
     "estimate unit.toml --model pubished": "--model = 'pubished': unknown name; closest: published; "
     "nearest accepted: 'published'",
-    "estimate unit.toml --frequency 125hz": "--frequency = '125hz': takes a number (HZ), such as 1",
+    "estimate unit.toml --frequency 125hz": "--frequency = '125hz': takes a number (HZ); nearest accepted: 125",
+    "estimate unit.toml --frequency fast": "--frequency = 'fast': takes a number (HZ), such as 1",
     "check part.csv --select TT": "--select = 'TT': unknown code; unitcad list rules lists all",
     "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
     "check parts.csv": "FILE = 'parts.csv': no such file; closest: part.csv",

@@ -33,6 +33,7 @@ from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
+from unitcad.spec.paths import EXACT, in_words, meant
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of, text_of
 from unitcad.text import join_words
@@ -297,7 +298,7 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
             below = next(numbers(key.value), ("", 0))[0]
             limit = f"unknown key; closest: unit.{key.field}{below and f'.{below}'}"
             raise UnknownKey(key.field, key.value, limit) from None
-        raise UnknownKey(key.field, key.value, limit, key.nearest) from None
+        raise _or_of_the_unit(key, limit, data) from None
     way = construction_of(asked.array, asked.limb.cast)
     if way.cast == "curved" and asked.limb.radius_mm is None:
         raise Refusal("limb.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
@@ -397,6 +398,19 @@ def array_hash(array: Array) -> str:
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
+def _or_of_the_unit(key: UnknownKey, limit: str, data: Mapping[str, Any]) -> UnknownKey:
+    """Return the refusal of an array's key with the keys of its unit that it may mean."""
+    unit = data.get("unit")
+    exact = () if key.settled else meant(key.field, key.value, AskedArray, data, EXACT)
+    if isinstance(unit, Mapping) and not key.settled and not (key.nearest and not exact):
+        below = meant(key.field, key.value, RawSpec, unit, EXACT)
+        if below:
+            every = (*exact, *(f"unit.{path}" for path in below))
+            only = every[0] if len(every) == 1 else None
+            return UnknownKey(key.field, key.value, f"unknown key; known: {in_words(every)}", only, every, key.root)
+    return UnknownKey(key.field, key.value, limit, key.nearest, key.meant, key.root, key.settled)
+
+
 def to_toml(array: Array) -> str:
     """Return the array as TOML, its units' specs whole in it: the same array when read again."""
     return text_of(array.asked)
@@ -416,8 +430,9 @@ def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> S
     except Refusal as refusal:
         own = at(data, refusal.field) is not ABSENT and refusal.field.split(".")[0] in _OVERRIDES
         place = refusal.field if own else f"{field}.{refusal.field}"
-        kind = UnknownKey if isinstance(refusal, UnknownKey) else Refusal
-        raise kind(place, refusal.value, refusal.limit, refusal.nearest) from None
+        if isinstance(refusal, UnknownKey):
+            raise refusal.under("" if own else field) from None
+        raise Refusal(place, refusal.value, refusal.limit, refusal.nearest) from None
 
 
 def _check_held(

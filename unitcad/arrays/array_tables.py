@@ -6,7 +6,7 @@ None means that the key is missing; `unitcad.arrays.array` has the same array wi
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -88,6 +88,7 @@ class CircuitTable(Table, frozen=True, kw_only=True):
 class AskedArray(Table, frozen=True, kw_only=True):
     """An array of units. `moulds`, `casting`, `estimate` and `output` override those of its units."""
 
+    removed: ClassVar = {"body": "limb"}
     name: Annotated[
         str, Meta(min_length=1, max_length=120, description="a name of the array; the result's folder begins with it")
     ]

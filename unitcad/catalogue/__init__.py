@@ -14,8 +14,10 @@ Examples
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from difflib import SequenceMatcher, get_close_matches
 from functools import cache
 from importlib.resources import files
 from typing import Any, TypeVar
@@ -41,6 +43,7 @@ from unitcad.catalogue.entries import (
     required_of,
 )
 from unitcad.errors import Refusal, unknown_name
+from unitcad.text import measured, some
 
 __all__ = [
     "FREQUENCIES_HZ",
@@ -210,8 +213,40 @@ def measurements() -> Measurements:
 def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:
     """Return `known[name]`. Raises `Refusal` with the field `kind` and the closest names."""
     if name not in known:
-        raise unknown_name(kind, name, known)
+        motors = {each: entry for each, entry in known.items() if isinstance(entry, Motor)}
+        raise _unknown_motor(kind, name, motors) if motors else unknown_name(kind, name, known)
     return known[name]
+
+
+_MOST_MOTORS = 8
+"""Motors that a refusal lists."""
+
+
+def _unknown_motor(field: str, name: str, known: Mapping[str, Motor]) -> Refusal:
+    """Return the refusal of a motor by its name, with those of like size.
+
+    Part numbers of coin motors begin with diameter and thickness: LCM1020 is one of 10 x 2.0 mm.
+    """
+    sizes = {each: (float(entry.diameter_mm), float(entry.thickness_mm)) for each, entry in known.items()}
+    digits, wide = re.search(r"(\d\d)(\d\d)", name), measured(name, "mm")
+    typed = get_close_matches(name.lower(), {each.lower(): each for each in known}, n=1, cutoff=_TYPED)
+    meant = (float(digits[1]), float(digits[2]) / 10) if digits else (wide, None) if wide else None
+
+    def off(each: str) -> tuple[float, float]:
+        if typed and each.lower() == typed[0]:
+            return -1.0, 0.0
+        if not meant:
+            return -SequenceMatcher(None, name.lower(), each.lower()).ratio(), 0.0
+        return abs(sizes[each][0] - meant[0]), abs(sizes[each][1] - meant[1]) if meant[1] is not None else 0.0
+
+    order = sorted(known, key=off)
+    listed = some((f"{each} ({sizes[each][0]:g} x {sizes[each][1]:g} mm)" for each in order), _MOST_MOTORS)
+    limit = f"unknown name; known: {listed}; for another motor leave part out and give diameter_mm and thickness_mm"
+    return Refusal(field, name, limit, order[0] if typed or meant else None)
+
+
+_TYPED = 0.85
+"""Least likeness of a name with the one that was meant, such as one with a wrong letter."""
 
 
 @cache

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import typing
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 import msgspec
 from msgspec import Meta, Struct
@@ -173,6 +173,7 @@ class Motor(Struct, frozen=True, kw_only=True):
 class Printer(Struct, frozen=True, kw_only=True):
     """A printer: its capability and the clearances that follow from it; all lengths mm, clearances per side."""
 
+    removed: ClassVar = {"draft_deg": "give moulds.draft_deg in the spec"}
     name: str
     technology: Value[Annotated[Literal["fdm", "sla"], Meta(description="fdm: molten filament; sla: cured resin")]]
     bed_x_mm: Value[Bed]
@@ -255,7 +256,7 @@ def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
         f"{entry.__name__}Entry",
         fields,
         module=__name__,
-        namespace={"__doc__": entry.__doc__},
+        namespace={"__doc__": entry.__doc__, "removed": getattr(entry, "removed", {})},
         frozen=True,
         kw_only=True,
         omit_defaults=True,

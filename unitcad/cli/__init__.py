@@ -14,7 +14,7 @@ from typing import NoReturn
 from unitcad.cli import command_line
 from unitcad.cli.command_line import app
 from unitcad.cli.output import form_of, say_error, speak_anywhere, warn
-from unitcad.errors import UnitcadError
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import in_the_way
 
 __all__ = ["app", "main"]
@@ -34,6 +34,19 @@ def _lacks_memory(error: BaseException) -> bool:
     # CPython raises SystemError if C code says that it failed and sets no exception, or the reverse.
     said = {SystemError: ("exception set", "setting an exception"), ImportError: ("failed to map segment",)}
     return any(part in str(error) for part in said.get(type(error), ()))
+
+
+def _of_the_system(error: OSError) -> UnitcadError:
+    """Return a system's error as one line: of the option -o if the place is in the folder or file that it names."""
+    if isinstance(error, NotADirectoryError | FileExistsError):
+        return in_the_way(Path(error.filename or ""))
+    place, why = error.filename, error.strerror or str(error)
+    for option, out in command_line.out_of(sys.argv[1:]):
+        there, here = Path(os.path.abspath(str(place))), Path(os.path.abspath(out))
+        if place and (there.is_relative_to(here) or here.is_relative_to(there)):
+            what = "" if here.is_relative_to(there) else f"{there.relative_to(here)} in it "
+            return Refusal(option, out, f"{what}can't be written: {why[:1].lower()}{why[1:]}")
+    return UnitcadError(f"{place}: {why}" if place else why)
 
 
 def _leave_interrupted() -> NoReturn:
@@ -60,11 +73,8 @@ def main() -> NoReturn:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except (NotADirectoryError, FileExistsError) as error:
-        failed, code = in_the_way(Path(error.filename or "")), 2
     except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        failed, code = UnitcadError(f"{place}{error.strerror or error}"), 2
+        failed, code = _of_the_system(error), 2
     except MemoryError:
         failed, code = UnitcadError("out of memory"), 1
     except Exception as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from difflib import get_close_matches
 from functools import partial
 from typing import Annotated, Any, cast
@@ -17,6 +17,7 @@ from unitcad import __version__
 from unitcad.cli.output import form_of, say_error
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.rooms import commands, load
+from unitcad.text import measured
 
 WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
 """Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
@@ -131,6 +132,14 @@ def run(words: list[str]) -> int:
         return error.exit_code
 
 
+def out_of(words: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield the option that names where results go, as typed, and its value."""
+    for i, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if option in ("-o", "--out"):
+            yield option, value if equals else "".join(words[i + 1 : i + 2])
+
+
 def _refuse(error: Any, words: list[str]) -> None:
     """Print an error of Typer's as one line, with the command whose help explains it."""
     context, form = getattr(error, "ctx", None), form_of(words)
@@ -163,5 +172,7 @@ def _in_style(error: Any, command: str) -> UnitcadError:
     if wrong := re.fullmatch(r"'(.*)' is not a valid (int|float).*", text):
         unit = f" ({parameter.metavar})" if parameter.metavar not in (None, "N") else ""
         whole = "whole " if wrong[2] == "int" else ""
-        return Refusal(name, wrong[1], f"takes a {whole}number{unit}, such as {parameter.default or 1}")
+        meant = measured(wrong[1], (parameter.metavar or "").lower())
+        such = "" if meant is not None else f", such as {parameter.default or 1}"
+        return Refusal(name, wrong[1], f"takes a {whole}number{unit}{such}", meant)
     return Refusal(name.strip("{}"), None, f"{text}; {more}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -33,6 +33,7 @@ SkippedLines = Annotated[int, between(0, 100000)]
 class SensorTable(Table, frozen=True, kw_only=True):
     """The sensor, and how its samples become the quantity."""
 
+    removed: ClassVar = {"full_scale": "unitcad finds clipping in the samples; leave it out"}
     quantity: Annotated[Quantity, Meta(description="quantity that the sensor measures")]
     unit: Annotated[Name, Meta(description="unit of the samples after scale, such as mm/s")]
     scale: Annotated[Positive, Meta(description="unit per volt, or per the unit in per")] = 1.0
@@ -42,6 +43,9 @@ class SensorTable(Table, frozen=True, kw_only=True):
 class RecordingTable(Table, frozen=True, kw_only=True):
     """Settings of all records, for what their files do not state."""
 
+    removed: ClassVar = dict.fromkeys(
+        ("own", "override"), "all records share [recording]; put others into a campaign of their own"
+    )
     rate_hz: Annotated[Rate | None, Meta(description="samples per second, if the files do not state it")] = None
     channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
     motor_channel: Annotated[Column | None, Meta(description="the motor's channel, recorded at the same time")] = None
@@ -57,6 +61,10 @@ class RecordingTable(Table, frozen=True, kw_only=True):
 class ChainTable(Table, frozen=True, kw_only=True):
     """The signal chains, the mains, and the band of the motor."""
 
+    removed: ClassVar = dict.fromkeys(
+        ("measure", "order", "q", "trim_s", "zero_phase"),
+        "the chain bandpass has constants, which the results name; leave it out",
+    )
     use: Annotated[
         tuple[Literal["line", "bandpass"], ...],
         Meta(min_length=1, description="signal chains; the first one's levels are the result"),
@@ -78,6 +86,10 @@ class PointTable(Table, frozen=True, kw_only=True):
 class UnitTable(Table, frozen=True, kw_only=True):
     """One unit: its name and its records."""
 
+    removed: ClassVar = {
+        **dict.fromkeys(("spec", "cast", "cavity"), "it belongs into [[unit]] of the file of unitcad fit"),
+        "lines": "unitcad finds a second line by itself; run one motor at a time and leave it out",
+    }
     name: Annotated[Name, Meta(description="a name of the unit; a fit's file has the same")]
     reference: Annotated[Records, Meta(description="records of the motor alone, without motor_channel")] = ()
     edge: Annotated[Records, Meta(description="records at the unit's edge")] = ()
@@ -87,6 +99,7 @@ class UnitTable(Table, frozen=True, kw_only=True):
 class Campaign(Table, frozen=True, kw_only=True):
     """A campaign: one sensor, units with their records."""
 
+    removed: ClassVar = {"blank": "unitcad names a line next to the mains by itself; leave it out"}
     name: Annotated[Name, Meta(description="a name of the campaign")]
     note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
     sensor: SensorTable

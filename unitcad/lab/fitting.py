@@ -6,7 +6,7 @@ import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta, field
@@ -67,6 +67,7 @@ class FitUnitTable(Table, frozen=True, kw_only=True):
 class FitLabFile(Table, frozen=True, kw_only=True):
     """A lab's measured units."""
 
+    removed: ClassVar = {"with_paper": "include_paper_units"}
     name: Annotated[Name, Meta(description="a name of the lab")]
     note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
     moduli: Annotated[

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -40,6 +40,10 @@ _NAME = "small letters a to z, digits and -, the first a letter or digit"
 class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One layer of the phantom, from the skin down."""
 
+    removed: ClassVar = {
+        "loss_factor": "the loss factor of silicone with thinner is an assumed range; leave it out",
+        "measured": "a layer takes a tested silicone and its share of thinner",
+    }
     name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
     silicone: Annotated[str, Meta(description="tested silicone: ecoflex-00-10, ecoflex-00-30 or ecoflex-00-50")]
     thinner_pct: Annotated[float, between(0, 100, "thinner, in parts by weight to 100 of A and B")]
@@ -49,6 +53,12 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A skin phantom: one box of silicone layers."""
 
+    removed: ClassVar = {
+        "inside_mm": "most_echo_pct",
+        "coupons": "the phantom has none; leave it out",
+        **dict.fromkeys(("stage_bolt_mm", "stage_pitch_mm"), "the tray is clamped at its ears; leave it out"),
+        **dict.fromkeys(("room_c", "scale_resolution_g"), "the recipe names its assumptions; leave it out"),
+    }
     name: Annotated[str, Meta(min_length=1, max_length=60, pattern=r"^[a-z0-9][a-z0-9-]*$", description=_NAME)]
     layers: Annotated[tuple[PhantomLayer, ...], Meta(min_length=1, max_length=6)]
     unit_diameter_mm: Annotated[float, between(4, 40, "diameter of the unit to measure")] = 14.0

@@ -12,24 +12,24 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from unitcad.errors import Refusal, UnknownKey, unknown_key, unknown_name
-from unitcad.spec.fields import alternatives, entry_in, fields_of, is_value, meaning, named_in, notes, table_in
-from unitcad.text import invisible, printable, without_invisible
+from unitcad.spec.fields import (
+    PLAIN_KINDS,
+    alternatives,
+    entry_in,
+    fields_of,
+    is_value,
+    meaning,
+    named_in,
+    notes,
+    plain_kinds,
+    table_in,
+)
+from unitcad.spec.paths import EXACT, in_words, lone_path, meant
+from unitcad.text import invisible, measured, printable, without_invisible
 
 T = TypeVar("T")
-_NAMES: dict[type, str] = {
-    bool: "true or false",
-    int: "a whole number",
-    float: "a number",
-    str: "a text",
-    list: "a list",
-    dict: "a table",
-}
-"""Kinds of plain data in words, in the order in which a refusal lists them."""
 _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 """Replacement of a byte that is not UTF-8."""
-_MEASURE = re.compile(r"\s*([-+]?\d*[.,]?\d+)\s*([A-Za-z%]*)\s*")
-_MM = {"mm": 1, "cm": 10, "m": 1000, "um": 0.001, "in": 25.4}
-"""Millimetres in a unit of length."""
 _MOST_KEYS, _MOST_WORDS = 5, 8
 """Keys of a table, and words of a key, that a refusal names."""
 _SWITCH = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
@@ -61,7 +61,22 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
         if isinstance(refusal, UnknownKey) and key != refusal.field and top and is_value(top.type):
             limit = f"unknown key; {key} belongs above the first [table]"
             raise UnknownKey(refusal.field, refusal.value, limit) from None
-        raise refusal from None
+        raise _by_meaning(refusal, data, kind) if isinstance(refusal, UnknownKey) and not field else refusal from None
+
+
+def _by_meaning(refusal: UnknownKey, data: Mapping[str, Any], kind: Any) -> UnknownKey:
+    """Return the refusal of a key with the paths that it may mean, if a path of the file means more than its spelling.
+
+    An exact key of another table comes before one of like spelling in its own, a word of a description after it.
+    """
+    path, value = lone_path(refusal.field, refusal.value)
+    close = None if refusal.settled else meant(path, value, kind, data, least=1 if refusal.nearest is None else EXACT)
+    if not close:
+        return refusal
+    if close == [refusal.nearest]:
+        return UnknownKey(refusal.field, refusal.value, refusal.limit, refusal.nearest, tuple(close))
+    limit = f"unknown key; known: {in_words(close)}"
+    return UnknownKey(path, value, limit, close[0] if len(close) == 1 else None, tuple(close), refusal.field)
 
 
 def without_none(node: Any) -> Any:
@@ -120,10 +135,8 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
             if key in fields:
                 yield from _refusals(below, fields[key].type, _below(field, key))
             else:
-                unknown = unknown_key(_below(field, key), below, fields, "`unitcad schema`")
-                homes = [] if field or unknown.nearest else _homes(key, fields)
-                moved = UnknownKey(key, below, f"unknown key at the top; known: {' or '.join(homes)}")
-                yield moved if homes else unknown
+                gone = getattr(table, "removed", {})
+                yield unknown_key(_below(field, key), below, fields, "`unitcad schema`", gone)
         missing = (name for name, entry in fields.items() if entry.required and name not in node)
         yield from (Refusal(_below(field, name), None, "is required") for name in missing)
         return
@@ -137,30 +150,23 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
     yield _refusal(node, kind, field)
 
 
-def _homes(key: str, fields: Mapping[str, Any]) -> list[str]:
-    """Return the paths of a key in the tables of a file, each list by its first entry."""
-    tables = {name: table_in(field.type) for name, field in fields.items()}
-    tables |= {f"{name}.0": table_in(entry) for name, field in fields.items() if (entry := entry_in(field.type))}
-    return [f"{name}.{key}" for name, table in tables.items() if table and key in fields_of(table)]
-
-
 def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     """Return why a value itself can't be a `kind`: its type, its word, its size or its length."""
-    table, known, words = table_in(kind), _plain_kinds(kind), _words(kind)
+    table, known, words = table_in(kind), plain_kinds(kind), _words(kind)
     given = next((plain for plain in (bool, float, str, dict) if isinstance(value, plain)), type(value))
     if isinstance(value, str) and words:
         unknown = unknown_name(field, value, words)
-        others = [_name(plain, kind) for plain in _NAMES if plain in known - {str}]
+        others = [_name(plain, kind) for plain in PLAIN_KINDS if plain in known - {str}]
         meant = [int(one) for one in re.findall(r"\d+", value)] if list in known else None
         nearest = meant if meant is not None and _fits(meant, kind) else unknown.nearest
         return Refusal(field, value, " or ".join([unknown.limit, *others]), nearest)
     if not (given in known or (given is int and float in known)):
-        names = [_name(plain, kind) for plain in _NAMES if plain in known]
+        names = [_name(plain, kind) for plain in PLAIN_KINDS if plain in known]
         limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
         meant = (
             [value] * _length(kind)  # a single value may be meant as the list
             if list in known
-            else _number(value, field)
+            else measured(value, field.rpartition("_")[2])
             if known & {int, float}
             else _SWITCH.get(str(value))
             if bool in known
@@ -194,24 +200,8 @@ def _out_of_range(value: float, kind: Any, field: str) -> Iterator[Refusal]:
     for note in notes(kind):
         for limit, words, broken in ((note.ge, "at least", float.__lt__), (note.le, "at most", float.__gt__)):
             if limit is not None and broken(float(value), float(limit)):
-                nearest = limit if float not in _plain_kinds(kind) else float(limit)
+                nearest = limit if float not in plain_kinds(kind) else float(limit)
                 yield Refusal(field, value, f"must be {words} {limit:g}", nearest)
-
-
-def _plain_kinds(kind: Any) -> set[type]:
-    """Return the kinds of plain data that a `kind` is made from."""
-    kinds: set[type] = set()
-    for one in alternatives(kind):
-        of = typing.get_origin(one) or one
-        if of is Literal:
-            kinds |= {type(word) for word in typing.get_args(one)}
-        elif of in (list, tuple):
-            kinds.add(list)
-        elif of is dict or table_in(one):
-            kinds.add(dict)
-        elif of in _NAMES:
-            kinds.add(of)
-    return kinds
 
 
 def _name(plain: type, kind: Any) -> str:
@@ -222,7 +212,7 @@ def _name(plain: type, kind: Any) -> str:
     if plain is str and _words(kind):
         return " or ".join(f'"{word}"' for word in _words(kind)[:_MOST_WORDS])
     if plain is not dict or not table:
-        return _NAMES[plain]
+        return PLAIN_KINDS[plain]
     fields = fields_of(table)
     required = [name for name, entry in fields.items() if entry.required]
     optional = [name for name in fields if name not in required][:_MOST_KEYS]
@@ -237,9 +227,9 @@ def _list_of(kind: Any) -> str:
     if table_in(entry):
         return f": {meaning(kind)}" if meaning(kind) else f", each entry {_name(dict, entry)}"
     examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}"}
-    if list in _plain_kinds(entry):
+    if list in plain_kinds(entry):
         return f" such as [{_list_of(entry).removeprefix(' such as ')}]"
-    one = f'"{_words(entry)[0]}"' if _words(entry) else next(examples[k] for k in examples if k in _plain_kinds(entry))
+    one = f'"{_words(entry)[0]}"' if _words(entry) else next(examples[k] for k in examples if k in plain_kinds(entry))
     return f" such as [{', '.join([one] * _length(kind))}]"
 
 
@@ -247,18 +237,6 @@ def _length(kind: Any) -> int:
     """Return the number of entries of a list; one if it is not fixed."""
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
     return next((len(entries) for entries in tuples if Ellipsis not in entries), 1)
-
-
-def _number(value: Any, field: str) -> float | None:
-    """Return the number that a text means, in the unit of its field: 14.5 for "14,5", "14.5 mm" or "1.45 cm"."""
-    parts = _MEASURE.fullmatch(value) if isinstance(value, str) else None
-    if not parts:
-        return None
-    unit, own = parts[2].lower(), field.rpartition("_")[2]
-    if unit not in ("", own) and not (own == "mm" and unit in _MM):
-        return None
-    number = float(parts[1].replace(",", ".")) * (_MM.get(unit, 1) if own == "mm" else 1)
-    return int(number) if number.is_integer() else number if math.isfinite(number) else None
 
 
 def _fits(value: Any, kind: Any) -> bool:

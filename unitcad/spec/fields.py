@@ -13,6 +13,15 @@ from typing import Annotated, Any
 import msgspec
 
 _UNIONS = (typing.Union, types.UnionType)
+PLAIN_KINDS: dict[type, str] = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    list: "a list",
+    dict: "a table",
+}
+"""Kinds of plain data in words, in the order in which a refusal lists them."""
 Fields = Mapping[str, msgspec.structs.FieldInfo]
 
 
@@ -45,6 +54,22 @@ def named_in(kind: Any) -> Any:
 def is_value(kind: Any) -> bool:
     """Tell whether `kind` takes no table, nor a list of tables: its key comes before every header of a file."""
     return not (table_in(kind) or named_in(kind) or table_in(entry_in(kind)))
+
+
+def plain_kinds(kind: Any) -> set[type]:
+    """Return the kinds of plain data that a `kind` is made from."""
+    kinds: set[type] = set()
+    for one in alternatives(kind):
+        of = typing.get_origin(one) or one
+        if of is typing.Literal:
+            kinds |= {type(word) for word in typing.get_args(one)}
+        elif of in (list, tuple):
+            kinds.add(list)
+        elif of is dict or table_in(one):
+            kinds.add(dict)
+        elif of in PLAIN_KINDS:
+            kinds.add(of)
+    return kinds
 
 
 def takes_none(kind: Any) -> bool:

@@ -7,7 +7,8 @@ same tables with every value there. Only types and ranges of single values are c
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, Struct
 
@@ -42,7 +43,12 @@ Model = Literal["rule", "published", "corrected", "divider", "fem"]
 
 
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
-    """A table of the spec: frozen, unknown keys refused."""
+    """A table of the spec: frozen, unknown keys refused.
+
+    `removed`: for each key of an earlier version the key that took its place, or what to do.
+    """
+
+    removed: ClassVar[Mapping[str, str]] = {}
 
 
 class MotorTable(Table, frozen=True, kw_only=True):
@@ -232,6 +238,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     150.0
     """
 
+    removed: ClassVar = {"stack": "the range is that of the rule; leave it out"}
     frequency_hz: Annotated[kinds.Frequency, Meta(description="frequency of the drive; default: the motor's")] = DERIVED
     amplitude_um: Annotated[kinds.Amplitude, Meta(description="amplitude of the motor; default: the motor's own")] = (
         DERIVED

@@ -23,7 +23,7 @@ from filelock import FileLock, Timeout
 from msgspec import Struct, ValidationError, convert, field, structs, to_builtins
 
 from unitcad import files
-from unitcad.errors import UnitcadError
+from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.plan import code_version
 from unitcad.sweeps.shard import Shard
 
@@ -277,7 +277,7 @@ def _lock(out: Path, head: BatchHead, shard: Shard | None, merge: bool) -> FileL
             f"{out}: another batch is running in this folder; wait for it or choose another with -o"
         ) from None
     except OSError as error:
-        raise UnitcadError(f"{out}: can't be written: {error.strerror}") from None
+        raise WrongArgument("out", os.fspath(out), f"can't be written: {error.strerror}") from None
     return lock
 
 

@@ -18,7 +18,7 @@ import os
 import re
 import typing
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -34,6 +34,7 @@ from unitcad.pipeline.subjects import subject_of_data
 from unitcad.rooms import load
 from unitcad.spec import check_plain, convert
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
+from unitcad.spec.paths import in_words, meant, paths_of
 from unitcad.spec.raw import RawSpec
 from unitcad.text import some
 from unitcad.validation import Changes, compound_kind, confirm_known, every_template, override, put, read
@@ -63,7 +64,7 @@ def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
                     f"they are 0 to {len(there) - 1}" if there[1:] else "its only one is 0" if there else "it is empty"
                 )
                 limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {has}"
-                raise UnknownKey(f"{place}.{path}", None, limit)
+                raise UnknownKey(f"{place}.{path}".lstrip("."), None, limit)
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
@@ -102,7 +103,7 @@ def label(values: Mapping[str, Any]) -> str:
 
 def known_paths(base: dict[str, Any]) -> list[str]:
     """List every path of a spec like `base`, tables and values, in the models' order."""
-    return list(_walk(_kind(base), "", base))
+    return [path for path, _ in paths_of(_kind(base), base)]
 
 
 def _kind(base: dict[str, Any]) -> Any:
@@ -110,22 +111,15 @@ def _kind(base: dict[str, Any]) -> Any:
     return load(kind.model) if kind else RawSpec
 
 
-def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:
-    table, entry = table_in(kind), entry_in(kind)
-    if table is not None:
-        for name, field in fields_of(table).items():
-            yield f"{prefix}{name}"
-            yield from _walk(field.type, f"{prefix}{name}.", node.get(name) if isinstance(node, dict) else None)
-    elif entry is not None:
-        for i, below in enumerate(node if isinstance(node, list) else []):
-            yield from _walk(entry, f"{prefix}{i}.", below)
-
-
 def _unknown(path: str, base: dict[str, Any], place: str) -> Refusal:
+    field = f"{place}.{path}".lstrip(".")
+    if several := meant(path, None, _kind(base), base):
+        only = several[0] if len(several) == 1 else None
+        return UnknownKey(field, None, "unknown key" if only else f"unknown key; known: {in_words(several)}", only)
     known = known_paths(base)
     begun = sorted((name for name in known if path and name.startswith(path)), key=len)
     close = begun or difflib.get_close_matches(path, known, n=1, cutoff=0.0)
-    return UnknownKey(f"{place}.{path}", None, "unknown key", close[0] if close else None)
+    return UnknownKey(field, None, "unknown key", close[0] if close else None)
 
 
 T = TypeVar("T", bound=Struct)
@@ -224,7 +218,7 @@ class Sweep:
             return self
         for path in changes:
             for data in self.bases.values():
-                check_path(path, data)
+                check_path(path, data, place="")
         bases = {name: override(data, changes) for name, data in self.bases.items()}
         return replace(self, bases=bases, fixed=(*self.fixed, *changes))
 

@@ -97,7 +97,7 @@ def load_file(source: str | os.PathLike[str], kind: str, judge: Callable[[dict[s
         for i, one in enumerate(every):
             if isinstance(one, UnknownKey):
                 limit = one.limit.replace("`unitcad schema`", f"`unitcad schema {kind}`")
-                every[i] = one = UnknownKey(one.field, one.value, limit, one.nearest)
+                every[i] = one = UnknownKey(one.field, one.value, limit, one.nearest, one.meant, one.root)
             one.file, one.line = os.fspath(path), line_of(text, one.field)
         every[0].others = tuple(every[1:])
         raise every[0] from None

@@ -48,6 +48,7 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
         raise Refusal(path, value, "the path runs through a value, not a table")
 
 
+_MOST_ENTRIES = 4
 ABSENT = object()
 """What `at` returns where nothing stands."""
 
@@ -93,8 +94,11 @@ def _index(node: list[Any], step: str, path: str, value: Any) -> int:
 
 def no_entry(path: str, value: Any, step: str, count: int) -> Refusal:
     """Return the refusal of a path with a step that names no entry of a list of `count` entries."""
-    has = f"has the entries 0 to {count - 1}" if count > 1 else "has the entry 0 alone" if count else "is empty"
     first = "; Layer 1 is layers.0" if path.startswith("layers.") else ""
+    if not step.isdigit() and count:
+        every = " or ".join(f"{path[: path.rindex(step)]}{i}.{step}" for i in range(min(count, _MOST_ENTRIES)))
+        return Refusal(path, value, f"{step} is a key of each entry: {every}{first}")
+    has = f"has the entries 0 to {count - 1}" if count > 1 else "has the entry 0 alone" if count else "is empty"
     return Refusal(path, value, f"no entry {step}: the list {has}{first}")
 
 

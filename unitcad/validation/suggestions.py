@@ -189,7 +189,9 @@ def suggest_value(
 
     `alone`: the file had no other fault. Only then is the blame looked for in other keys, which takes many trials.
     """
-    if isinstance(refusal, UnknownKey) or _does(refusal, data, judge):
+    if isinstance(refusal, UnknownKey):
+        return _with_value(refusal, data, judge)
+    if _does(refusal, data, judge):
         return refusal
     field, value, limit = refusal.field, refusal.value, refusal.limit
     together, met = follow(refusal, data, judge)
@@ -211,6 +213,19 @@ def suggest_value(
         limit = f"{limit}; the value offered here also needs {write_changes(rest, 'and')}"
         return Refusal(field, value, limit, together[field])
     return Refusal(field, value, limit)
+
+
+def _with_value(refusal: UnknownKey, data: Mapping[str, Any], judge: Judge) -> UnknownKey:
+    """Return the refusal of a key that may mean others with what its value would be there, if it is not taken."""
+    if not refusal.meant or at(data, refusal.field) is ABSENT:
+        return refusal
+    path = refusal.meant[0]
+    after = find_refusal(data, {refusal.root: None, path: refusal.value}, judge)
+    if after is None or after.field != path:
+        return refusal
+    there = bare(after) if after.nearest is None or isinstance(after.nearest, str) else f"{path} = {after.nearest}"
+    limit = f"{refusal.limit}; {there}"
+    return UnknownKey(refusal.field, refusal.value, limit, refusal.nearest, refusal.meant, refusal.root)
 
 
 def culprit_of(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> dict[str, object]:
@@ -305,6 +320,7 @@ def _pass_over(
         right = refusal.nearest
         if isinstance(right, str) and right.rpartition(".")[0] == table and at(data, right) is ABSENT:
             ways = [{field: None, right: at(data, field)}]
+        ways.append({refusal.root: None})
     else:
         ways = [{field: value} for value in (at(sound, field), refusal.nearest) if value not in (None, ABSENT)]
     # A word of a list of words: the list's default takes its place.
