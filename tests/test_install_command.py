@@ -4,14 +4,18 @@ import json
 import re
 import shlex
 import sys
+import tomllib
 from importlib import metadata, util
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from packaging.requirements import Requirement
 
 from unitcad import errors
 from unitcad.errors import install_command
+
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture
@@ -68,3 +72,35 @@ def test_an_environment_without_pip_uses_uv(installed_from, monkeypatch):
     source = {"url": "https://git.example/unitcad-1.whl", "archive_info": {}}
     command = ["uv", "pip", "install", "--python", sys.executable]
     assert installed_from(source) == [*command, "unitcad[lab] @ https://git.example/unitcad-1.whl"]
+
+
+MACHINES = {
+    ("linux", "x86_64"): True,
+    ("linux", "aarch64"): True,
+    ("darwin", "arm64"): True,
+    ("darwin", "x86_64"): True,
+    ("win32", "AMD64"): True,
+    ("win32", "ARM64"): False,
+    ("win32", "x86"): False,
+    ("linux", "armv7l"): False,
+    ("linux", "i686"): False,
+}
+
+
+@pytest.mark.parametrize(("where", "has"), MACHINES.items(), ids=str)
+def test_readmes_command_installs_on_machines_without_a_step_kernel(where, has, monkeypatch):
+    """The extras leave the kernel out there, and a build then says so in place of a command that can't help."""
+    system, machine = where
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    kernels = [
+        Requirement(line)
+        for extra in ("step", "build123d", "cadquery")
+        for line in extras[extra]
+        if not line.startswith("unitcad")
+    ]
+    assert len(kernels) == 4
+    for kernel in kernels:
+        assert kernel.marker.evaluate({"platform_machine": machine, "sys_platform": system}) == has, kernel
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    assert (errors.install_step() == install_command("step")) == has
+    assert has or errors.install_step() == f"it has no wheel for {machine}"

@@ -47,6 +47,18 @@ class UnitcadError(Exception):
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
+STEP_MACHINES = ("x86_64", "AMD64", "aarch64", "arm64")
+"""The machines for which the STEP kernel has wheels, as the markers of pyproject.toml name them."""
+
+
+def install_step() -> str:
+    """Return the command that adds the STEP kernel, or that it has no wheel for this machine."""
+    import platform  # only here: most commands need no name of the machine
+
+    machine = platform.machine()
+    return install_command("step") if machine in STEP_MACHINES else f"it has no wheel for {machine}"
+
+
 class Missing(UnitcadError):
     """A lack of this machine or installation: a library of an extra, a folder that only a clone has."""
 

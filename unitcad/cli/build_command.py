@@ -34,7 +34,7 @@ from unitcad.cli.shared_options import (
     with_fit,
 )
 from unitcad.designs import widths
-from unitcad.errors import UnitcadError, WrongArgument, install_command
+from unitcad.errors import UnitcadError, WrongArgument, install_step
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
@@ -244,7 +244,7 @@ def _print_faults(manifest: Manifest) -> None:
         warn(f"warning: {warning}")
     for entry in manifest["skipped"]:
         if entry["reason"] == NO_KERNEL:
-            warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
+            warn(f"note: STEP left out: {entry['reason']}; {install_step()}")
         if entry["reason"].startswith(UNMADE):
             warn(f"warning: {entry['output']} {entry['reason']}")
     checks = manifest["mould_checks"]
