@@ -25,6 +25,13 @@ def heights(triangle, over):
     return [dot(normal, minus(p, over[0])) for p in triangle]
 
 
+def off_plane(a, b):
+    """The largest distance of a corner of a from the plane of b."""
+    one, other = [point(p) for p in a], [point(p) for p in b]
+    normal = cross(minus(other[1], other[0]), minus(other[2], other[0]))
+    return float(max(abs(h) for h in heights(one, other))) / float(dot(normal, normal)) ** 0.5
+
+
 def _cut(triangle, other):
     """Where a triangle's border meets the other's plane, and its corners' heights over it."""
     height = heights(triangle, other)

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from exact_pairs import counts
+from exact_pairs import counts, off_plane
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.geometry import boxes
 from unitcad.meshcheck.geometry import crossings
 from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
+from unitcad.meshcheck.geometry.resolution import STEPS
 from unitcad.meshcheck.geometry.topology import topology_of
 from unitcad.meshcheck.rules.f_file import Deadline
 
@@ -66,16 +67,18 @@ def _compare(kind, seed):
     crossing, overlaps, touching = counts(vertices, faces)
     shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
     found = crossings.crossings_of(top, Deadline(60).tick)
-    _agree(found, kind, crossing, overlaps)
-    assert {tuple(pair) for pair in found.touching().tolist()} == shells
-    return crossing, len(crossings.join_pairs(found.covering)), len(shells)
-
-
-def _agree(found, kind, crossing, overlaps):
     assert len(crossings.join_pairs(found.crossing)) == crossing
+    assert {tuple(pair) for pair in found.touching().tolist()} == shells
+    lying = crossings.join_pairs(found.lying)
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
-    covers = len(crossings.join_pairs(found.covering))
-    assert (0 if kind == "slivers" else overlaps[0]) <= covers <= overlaps[1]
+    if kind not in ("slivers", "sheared lattice", "turned boxes"):
+        assert overlaps[0] <= len(lying) <= overlaps[1]
+    for i, j in lying.tolist():
+        corners = [vertices[found.faces.corners[:, k]] for k in (i, j)]
+        assert min(off_plane(*corners), off_plane(*corners[::-1])) <= STEPS * np.spacing(
+            np.float32(1e3 if kind == "far away" else 8)
+        )
+    return crossing, len(lying), len(shells)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -11,7 +11,7 @@ from shapes import box, stl
 
 from tests.in_process import unitcad
 
-GOOD, HOLE, WARN = stl(box()), stl(box()[2:]), stl(box(), header=b"solid")
+GOOD, HOLE, WARN = stl(box()), stl(box()[2:]), stl(box()) + bytes(16)
 
 
 run = partial(unitcad, "check")

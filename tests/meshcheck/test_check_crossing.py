@@ -84,11 +84,12 @@ def test_crossing_count_equals_brute_force(mesh):
     assert crossing.count == counts(points, faces)[0] > 0
 
 
-@pytest.mark.parametrize("code", ["G002", "G003"])
-@pytest.mark.parametrize(("shared", "overlap"), [(0.0, False), (0.9e-6, False), (1.1e-6, True)])
-def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code, shared, overlap):
-    assert "a millionth of the smaller one" in explain(code)
-    points = np.concatenate([CUBE_CORNERS, CUBE_CORNERS * [2, 1, 1] + [1 - shared, 0, 0]]) * 10
+@pytest.mark.parametrize(("shared", "overlap"), [(0.0, False), (3.9, False), (4.1, True)])
+def test_shells_in_line_overlap_from_four_float32_steps_on_as_the_rules_say(shared, overlap):
+    """Their faces lie on each other and do not cross."""
+    assert "four float32 steps" in explain("G003")
+    step = float(np.spacing(np.float32(30)))
+    points = np.concatenate([CUBE_CORNERS * 10, CUBE_CORNERS * [20, 10, 10] + [10 - shared * step, 0, 0]])
     found = {item.code for item in check_mesh(points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])).findings}
     assert "G003" in found
     assert ("G002" in found) == overlap

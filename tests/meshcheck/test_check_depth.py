@@ -27,12 +27,12 @@ def strips(n, at, up):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.parametrize(("depth", "right"), [(1e-5, "warning"), (0.0056, "warning"), (0.05, "error"), (3.0, "error")])
+@pytest.mark.parametrize(("depth", "right"), [(1e-5, "info"), (0.0056, "warning"), (0.05, "error"), (3.0, "error")])
 def test_two_boxes_by_the_depth_of_their_overlap(depth, right, name, judge):
     """3MF's fill rule settles what crosses, whatever its depth."""
     content = in_format(np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]), name)
     found = severities(judge(content, name))
-    assert found["G001"] == ("warning" if name.endswith("3mf") else right)
+    assert found["G001"] == ("warning" if name.endswith("3mf") and right == "error" else right)
     assert found.get("G002", right) == found["G001"]
     strict = severities(judge(content, name, strict=True))
     assert set(strict.values()) == ({"warning"} if name.endswith("3mf") else {"error"})
@@ -40,7 +40,7 @@ def test_two_boxes_by_the_depth_of_their_overlap(depth, right, name, judge):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_turned_boxes_overlap_as_those_that_stand(seed, judge):
-    both = {depth: np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]) for depth in (0.001, 0.5)}
+    both = {depth: np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]) for depth in (0.002, 0.5)}
     found = [severities(judge(stl(turned(body, seed, shift=20)))) for body in both.values()]
     assert [set(codes.values()) for codes in found] == [{"warning"}, {"error"}]
 
@@ -76,7 +76,7 @@ def test_a_fin_without_thickness_is_an_error_however_its_sides_are_cut(n, m, jud
     assert found["G009"] == "error"
 
 
-@pytest.mark.parametrize(("width", "right"), [(1e-4, "warning"), (3e-4, "warning"), (0.009, "warning"), (0.1, "error")])
+@pytest.mark.parametrize(("width", "right"), [(1e-4, "info"), (3e-4, "info"), (0.1, "warning"), (0.5, "error")])
 @pytest.mark.parametrize("name", ["binary.stl", "part.ply", "part.obj"])
 def test_a_vertex_across_its_neighbours_edge_folds_the_top(width, right, name, judge):
     """The top of a cube of 20 mm has a vertex in its middle, `width` across the diagonal that it should lie on."""
@@ -92,10 +92,10 @@ def test_a_vertex_across_its_neighbours_edge_folds_the_top(width, right, name, j
     assert "G009" in found
 
 
-def test_a_foil_that_lies_in_a_box_is_an_error(judge):
-    """All of it is shared, though it is thinner than what is called shallow."""
-    found = severities(judge(stl(np.concatenate([box(), box((6, 6, 0.01), (2, 2, 5))]))))
-    assert found == {"G002": "error"}
+@pytest.mark.parametrize(("thick", "right"), [(0.01, "warning"), (0.03, "error")])
+def test_a_foil_that_lies_in_a_box_is_an_error_from_what_a_layer_may_show(thick, right, judge):
+    found = severities(judge(stl(np.concatenate([box(), box((6, 6, thick), (2, 2, 5))]))))
+    assert found == {"G002": right}
 
 
 @pytest.mark.parametrize("more", [0, 1, 3])
@@ -108,7 +108,7 @@ def test_faces_without_area_back_to_back_are_that_alone(more, seed, judge):
     if seed is not None:  # by right angles, so that the corners stay on a line exactly
         body = np.roll(body, seed + 1, axis=2)
     report = judge(stl(body))
-    assert {found.code: found.severity for found in report.findings} == {"T010": "warning"}
+    assert {found.code: found.severity for found in report.findings} == {"T010": "info"}
 
 
 def test_a_file_of_faces_without_area_only_has_no_volume(judge):

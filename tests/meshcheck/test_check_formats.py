@@ -31,7 +31,7 @@ def sarif_of(*reports):
 @pytest.fixture
 def reports(tmp_path):
     names = {"good.stl": stl(box()), "hole & <b>.stl": stl(box()[2:]), "text.stl": text_stl(box())[:-30].encode()}
-    names["warn, 100%.stl"] = stl(box(), header=b"solid")
+    names["warn, 100%.stl"] = stl(box()) + bytes(16)
     found = []
     for name, content in names.items():
         (tmp_path / name).write_bytes(content)
@@ -70,7 +70,7 @@ def test_github_annotations_are_escaped(reports):
     assert last == "4 files: 2 failed, 1 warned, 1 passed"
     assert len(lines) == sum(len(report.findings) for report in reports)
     assert lines[0].startswith("::error file=hole & <b>.stl,title=T001 boundary edge::4 boundary edges")
-    assert any("::warning file=warn%2C 100%25.stl,title=F007 " in line for line in lines)
+    assert any("::warning file=warn%2C 100%25.stl,title=F006 " in line for line in lines)
     assert any("::error file=text.stl,line=" in line for line in lines)
 
 
@@ -229,15 +229,15 @@ def test_rules_are_whole():
 
 def test_select_and_ignore_by_longest_prefix(tmp_path):
     path = tmp_path / "a.stl"
-    path.write_bytes(stl(box()[2:], header=b"solid", normals=np.tile([0.0, 0.0, 1.0], (10, 1))))
+    path.write_bytes(stl(box()[2:], normals=np.tile([0.0, 0.0, 1.0], (10, 1))) + bytes(16))
 
     def codes(**given):
         return [found.code for found in check_file(path, Options(**given)).findings]
 
-    assert codes() == ["T001", "F007", "T013"]
+    assert codes() == ["T001", "F006", "T013"]
     assert codes(select=("T",)) == ["T001", "T013"]
-    assert codes(select=("T001", "F")) == ["T001", "F007"]
-    assert codes(ignore=("T",)) == ["F007"]
+    assert codes(select=("T001", "F")) == ["T001", "F006"]
+    assert codes(ignore=("T",)) == ["F006"]
     assert codes(select=("T001",), ignore=("T",)) == ["T001"]
     assert codes(select=("T",), ignore=("T013",)) == ["T001"]
     with pytest.raises(Refusal):

@@ -54,7 +54,7 @@ def test_a_file_name_is_no_option_of_the_hook(own, tmp_path):
     names = [name.replace("{outside}", outside) for name in NAMES]
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(stl(box(), header=b"solid") if name.endswith("stl") else b"v 0 0 0\n")
+        (folder / name).write_bytes(stl(box()) + bytes(16) if name.endswith("stl") else b"v 0 0 0\n")
     (folder / "own.toml").write_text("[check]\nfail-on = 'error'\n")
     before = sorted(tmp_path.rglob("*"))
     entry = _value((ROOT / ".pre-commit-hooks.yaml").read_text("utf-8"), "entry").split()
@@ -209,7 +209,7 @@ def test_the_action_installs_the_step_kernel_on_demand(step, code, wanted, tmp_p
 @pytest.mark.parametrize(("fail_on", "code"), [("", 1), ("error", 0)])
 def test_the_action_takes_the_checkouts_settings(fail_on, code, tmp_path):
     (tmp_path / "work").mkdir()
-    (tmp_path / "work/warn.stl").write_bytes(stl(box(), header=b"solid"))
+    (tmp_path / "work/warn.stl").write_bytes(stl(box()) + bytes(16))
     (tmp_path / "work/unitcad.toml").write_text("[check]\nfail-on = 'warning'\n")
     done = _run_action(tmp_path, FILES="warn.stl", FAIL_ON=fail_on)
     assert done.returncode == code, done.stderr

@@ -36,6 +36,7 @@ def _planes(a, b):
         np.ascontiguousarray(points.T),
         np.ascontiguousarray(faces.T),
         np.ascontiguousarray(area_vectors(points, faces).T),
+        np.zeros(len(faces)),
     )
 
 
@@ -48,7 +49,10 @@ def test_what_a_plane_sets_apart_is_apart(kind):
     planes, i = _planes(a, b), np.arange(N)
     solid = (planes.normal != 0).any(axis=0)
     none = np.zeros(N, np.int8)
-    by_plane = planes.one_side(i, planes.vertices(i + N), none) | planes.one_side(i + N, planes.vertices(i), none)
+    one, other = (
+        planes.one_side(*pair, none)[0] for pair in ((i, planes.vertices(i + N)), (i + N, planes.vertices(i)))
+    )
+    by_plane = one | other
     whole = np.flatnonzero(solid[:N] & solid[N:])
     exact = meet(a[whole], b[whole])
     meets = exact.touches | exact.crosses | exact.overlaps

@@ -5,8 +5,7 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.meshcheck import check_mesh
-from unitcad.meshcheck.geometry import crossings, predicates
-from unitcad.meshcheck.rules import g_shells
+from unitcad.meshcheck.geometry import crossings, nesting, predicates
 
 
 def cubes(n, turned=False):
@@ -49,7 +48,7 @@ def work(monkeypatch):
 
     watch(crossings, "_decide_exactly", "sieved", lambda _, i, *others: len(i))
     watch(predicates, "meet", "decided", lambda a, _: len(a))
-    watch(g_shells, "_shared", "booleans", lambda *_: 1)
+    watch(nesting, "_compare", "booleans", lambda _, pairs, *__: len(pairs))
 
     def judged(built):
         count.clear()

@@ -7,7 +7,7 @@ import pytest
 from shapes import box, model_xml, package, stl
 from test_check_command import run
 
-HOLE, WARN, FILM = stl(box()[2:]), stl(box(), header=b"solid"), stl(box((20, 20, 0.35)))
+HOLE, WARN, FILM = stl(box()[2:]), stl(box()) + bytes(16), stl(box((20, 20, 0.35)))
 
 
 @pytest.fixture
@@ -26,10 +26,10 @@ def codes(result):
 
 def test_the_nearest_file_upwards_is_used_and_named(folder):
     name, head = "unitcad.toml", "[check]"
-    (folder / name).write_text(f'{head}\nselect = ["F007"]\n')
+    (folder / name).write_text(f'{head}\nselect = ["F006"]\n')
     result = run(".", "--json", cwd=folder / "sub" / "deep")
     assert json.loads(result.stdout)["config"] == f"../../{name}"
-    assert codes(run(".", "--json", cwd=folder)) == {"hole.stl": [], "warn.stl": ["F007"], "film.stl": []}
+    assert codes(run(".", "--json", cwd=folder)) == {"hole.stl": [], "warn.stl": ["F006"], "film.stl": []}
     (folder / "sub" / name).write_text(f'{head}\nselect = ["T"]\n')
     assert codes(run(".", "--json", cwd=folder / "sub")) == {"hole.stl": ["T001"], "warn.stl": [], "film.stl": []}
     assert json.loads(run("..", "--json", cwd=folder / "sub").stdout)["config"] == name

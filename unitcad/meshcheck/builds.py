@@ -285,7 +285,7 @@ def _filled(findings: Iterable[Finding], strict: bool = False) -> Iterator[Findi
         if strict and item.code in _MANIFOLD:
             yield replace(item, severity="error", message=f"{item.message} (3MF's core specification, 4.1, forbids it)")
             continue
-        if item.code in _FILLED:
+        if item.code in _FILLED and item.severity == "error":
             yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
         else:
             yield item

@@ -65,8 +65,8 @@ class Location:
 
     A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
-    `line` is that of the first face if the format has lines, otherwise that of the fault. `region`, for pictures: its
-    triangles in the mesh of number `mesh`.
+    `line` is that of the first face if the format has lines, otherwise that of the fault. For pictures: `region`, its
+    triangles in the mesh of number `mesh`, and `layer`, the layer that the finding spoils most.
     """
 
     face: int | None = None
@@ -77,6 +77,7 @@ class Location:
     faces: tuple[int, ...] = ()
     region: Any = field(default=None, compare=False, repr=False)
     mesh: int | None = field(default=None, compare=False, repr=False)
+    layer: Any = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.faces and self.face is None:

@@ -1,4 +1,4 @@
-"""Faces of a mesh that cross, touch or cover each other in one plane, decided exactly, and how deep."""
+"""Faces of a mesh that cross or touch, decided exactly, and those that lie on each other to within rounding."""
 
 from __future__ import annotations
 
@@ -6,40 +6,25 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, extents, sorted_with_order
 from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, meeting_pairs, slabs_of
+from unitcad.geometry.components import components
 from unitcad.meshcheck.geometry import predicates
-from unitcad.meshcheck.geometry.mesh import area_vectors, float32_steps, same_place
-from unitcad.meshcheck.geometry.predicates import orient3d
+from unitcad.meshcheck.geometry.mesh import float32_steps, same_place
+from unitcad.meshcheck.geometry.resolution import STEPS
 from unitcad.meshcheck.geometry.sieves import MOST_CONTACTS, Contacts, Planes, height_fields, planes_of
 from unitcad.meshcheck.geometry.topology import (
-    Edges,
     Topology,
     Turns,
     edges_of,
-    max_side_squared,
     side_by_side,
     surrounded_vertices,
 )
-
-_FOLD = 2.0  # float32 steps: a fold thinner than that has no thickness
-_WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
-
-
-def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Bools]:
-    """Return which pairs that cover each other in one plane double a shell (G008), and which leave no room (G009).
-
-    `shells` (n, 2) are theirs; `opposite`: they look opposite ways. The others belong to two shells side by side, or to
-    one within the other, which G003 and G002 report.
-    """
-    volume, closed = topology.volumes[shells], topology.closed[shells].all(axis=1)
-    apart = shells[:, 0] != shells[:, 1]
-    bare = apart & closed & ~side_by_side(volume[:, 0], volume[:, 1])
-    return ~opposite & ~apart, opposite & (~apart | bare)
 
 
 def run_alike(a: Ints, b: Ints) -> Bools:
@@ -49,15 +34,62 @@ def run_alike(a: Ints, b: Ints) -> Bools:
     return np.asarray(same.any(axis=(1, 2)))
 
 
-def wide_pairs(a: Floats, b: Floats) -> Bools:
-    """Return which coplanar pairs that overlap are higher than four float32 steps both. Rounding makes lower ones."""
-    high = np.ones(len(a), bool)
-    least = 4 * float32_steps(np.concatenate([a, b], axis=1))
-    for corners in (a, b):
-        double = area_vectors(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-        height = np.sqrt(np.einsum("ij,ij->i", double, double)) / np.sqrt(max_side_squared(corners))
-        high &= height > least
-    return high
+def lapping(a: Floats, b: Floats, rounding: Floats) -> Bools:
+    """Return which pairs of faces (n, 3, 3) that lie in one plane share a strip wider than `rounding` (n,), mm.
+
+    A face that is no higher than that has no such strip.
+    """
+    normals = [cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0]) for of in (a, b)]
+    size = [np.einsum("ij,ij->i", normal, normal) for normal in normals]
+    normal = np.where((size[0] >= size[1])[:, None], *normals)
+    share = np.ones(len(a), bool)
+    for of in (a, b):
+        for k in range(3):
+            axis = cross(of[:, k] - of[:, k - 1], normal)
+            one, other = (np.einsum("ikj,ij->ik", corners - a[:, :1], axis) for corners in (a, b))
+            strip = np.minimum(one.max(axis=1) - other.min(axis=1), other.max(axis=1) - one.min(axis=1))
+            least = rounding * np.sqrt(np.einsum("ij,ij->i", axis, axis))
+            share &= strip > least
+            share &= np.ptp(one if of is a else other, axis=1) > least
+    return share
+
+
+def within(a: Floats, b: Floats, reach: Floats) -> Ints:
+    """Return the pairs of faces (n, 3, 3), of those that do not meet, that are no farther apart than `reach` (n,), mm.
+
+    The nearest points are on an edge of each, or a corner of one and the inside of the other.
+    """
+    boxes = [(of.min(axis=1), of.max(axis=1)) for of in (a, b)]
+    apart = np.maximum(boxes[0][0] - boxes[1][1], boxes[1][0] - boxes[0][1])
+    left = np.flatnonzero((apart <= reach[:, None]).all(axis=1))
+    a, b, reach = a[left], b[left], reach[left]
+    near = np.zeros(len(left), bool)
+    for points, of in ((a, b), (b, a)):
+        normal = cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0])
+        size = np.sqrt(np.einsum("ij,ij->i", normal, normal))
+        for k in range(3):
+            off = points[:, k] - of[:, 0]
+            here = np.abs(np.einsum("ij,ij->i", off, normal)) <= reach * size
+            for m in range(3):
+                inward = cross(normal, of[:, m] - of[:, m - 1])
+                here &= np.einsum("ij,ij->i", points[:, k] - of[:, m], inward) >= 0
+            near |= here
+    for k in range(3):
+        for m in range(3):
+            near |= _apart(a[:, k - 1], a[:, k], b[:, m - 1], b[:, m]) <= reach
+    return left[near]
+
+
+def _apart(p: Floats, q: Floats, r: Floats, s: Floats) -> Floats:
+    """Return the distances of the segments p q and r s, (n, 3) each (Ericson, Real-Time Collision Detection, 5.1.9)."""
+    along, across, off = q - p, s - r, p - r
+    a, b, c = (np.einsum("ij,ij->i", *pair) for pair in ((along, along), (along, across), (across, across)))
+    d, e = (np.einsum("ij,ij->i", side, off) for side in (along, across))
+    one = np.clip((b * e - c * d) / np.maximum(a * c - b * b, 1e-300), 0, 1)
+    other = np.clip((b * one + e) / np.maximum(c, 1e-300), 0, 1)
+    one = np.clip((b * other - d) / np.maximum(a, 1e-300), 0, 1)
+    between = off + one[:, None] * along - other[:, None] * across
+    return np.sqrt(np.einsum("ij,ij->i", between, between))
 
 
 def through_edges(turns: Turns | None, shells: Ints) -> Ints:
@@ -85,35 +117,6 @@ def through_edges(turns: Turns | None, shells: Ints) -> Ints:
     return turns.many[np.unique(group[start][(high - low > 1) & evenly])]
 
 
-def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> tuple[Ints, Floats, Floats]:
-    """Return edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly.
-
-    And for each of them the heights of its two faces, mm, the lower one first.
-    """
-    two = (edges.size == 2) & edges.balanced  # two faces that run alike are turned over, not folded
-    pair = edges.first[two]
-    left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
-    facing = np.einsum("ij,ij->i", areas.take(left, axis=0), areas.take(right, axis=0))
-    against = np.flatnonzero(facing < 0)
-    if not len(against):
-        return against, np.empty(0), np.empty(0)
-    pair, left, right, facing = pair[against], left[against], right[against], facing[against]
-    square = [np.einsum("ij,ij->i", areas[face], areas[face]) for face in (left, right)]
-    flat = facing * facing > (1 - 1e-6) * square[0] * square[1]
-    pair, left, square = pair[flat], left[flat], [values[flat] for values in square]
-    ends = [faces[edges.order[pair] // 3, (edges.order[pair] % 3 + k) % 3] for k in range(3)]
-    tip = faces[edges.order[pair + 1] // 3, (edges.order[pair + 1] % 3 + 2) % 3]
-    corners = vertices[np.stack([*ends, tip], axis=1)]
-    step = float32_steps(corners)
-    length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
-    height, higher = (np.sqrt(of(*square)) / length for of in (np.minimum, np.maximum))
-    apart = np.abs(np.einsum("ij,ij->i", areas[left], corners[:, 3] - corners[:, 0])) / np.sqrt(square[0])
-    thin = np.flatnonzero((height > _WIDE * step) & (apart <= _FOLD * step))
-    exact = orient3d(*(corners[thin, k] for k in range(4))) == 0
-    thin = thin[~exact]
-    return np.flatnonzero(two)[against][flat][thin], height[thin], higher[thin]
-
-
 Pairs = tuple[Ints, Ints]
 _AHEAD = 8  # blocks that wait for the second thread
 _BLOCK = 1 << 17  # pairs of faces decided together
@@ -128,7 +131,7 @@ class Faces:
 
     `corners` (3, m) are their vertices, and `safe` (3, m) those whose stars are height fields, -1 for the others.
     `shell` and `original` (m,) give each face's shell and its number in the file. `several`: whether there are several
-    shells.
+    shells. `rounding` (m,): how far rounding may move a face's plane, mm.
     """
 
     vertices: Floats
@@ -138,20 +141,29 @@ class Faces:
     shell: Ints
     original: Ints
     several: bool
+    rounding: Floats
+
+    def corners_of(self, *pair: Ints) -> list[Floats]:
+        """Return the corners (n, 3, 3) of the faces of each side of pairs."""
+        return [self.vertices[self.corners[:, f].T] for f in pair]
 
 
 @dataclass(eq=False)
 class Crossings:
     """Pairs of `faces` that meet, collected over the blocks; `stopped`: why not all were looked at, None if they were.
 
-    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet.
+    `crossing` pass through each other, `lying` lie on each other to within rounding. `contact` has pairs of shells that
+    meet, `near` those that rounding may have moved apart. `leaned` (k, 3) are two faces on either side of a third one
+    that holds their common edge; they are the last of `crossing`.
     """
 
     faces: Faces | None = None
     contact: Contacts = field(default_factory=lambda: Contacts(0))
+    near: Contacts = field(default_factory=lambda: Contacts(0))
     crossing: list[Ints] = field(default_factory=list)
-    covering: list[Ints] = field(default_factory=list)
+    lying: list[Ints] = field(default_factory=list)
     leaning: list[Ints] = field(default_factory=list)
+    leaned: Ints = field(default_factory=lambda: np.empty((0, 3), np.int32))
     kept: int = 0
     looked_at: int = 0
     stopped: Interrupted | None = None
@@ -164,6 +176,83 @@ class Crossings:
     def touching(self) -> Ints:
         """Return pairs of shells (k, 2) whose faces meet, the smaller number first."""
         return np.stack(np.divmod(self.contact.pairs()[0], self.contact.shells), axis=1)
+
+    def touching_shells(self) -> Ints:
+        """Return the keys, sorted, of pairs of shells whose faces meet, or would but for rounding."""
+        return np.unique(np.concatenate([self.contact.pairs()[0], self.near.pairs()[0]]))
+
+    def crossing_shells(self) -> Ints:
+        """Return the keys, sorted, of pairs of shells that cross by more than rounding."""
+        if self.faces is None:
+            return np.empty(0, np.int64)
+        return np.unique(self.contact.keys(*self.faces.shell[self.deep].T))
+
+    def kinds(self, topology: Topology) -> tuple[Ints, Ints, Ints]:
+        """Return the pairs that lie on each other: in one shell and alike, with no room between, all others.
+
+        The others belong to two shells side by side, or to one within the other, which G003 and G002 report.
+        """
+        pairs = join_pairs(self.lying)
+        if self.faces is None:
+            return pairs, pairs, pairs
+        shells, opposite = self.faces.shell[pairs], facing(self.faces, *pairs.T) < 0
+        volume, closed = topology.volumes[shells], topology.closed[shells].all(axis=1)
+        apart = shells[:, 0] != shells[:, 1]
+        bare = apart & closed & ~side_by_side(volume[:, 0], volume[:, 1])
+        twice, thin = ~opposite & ~apart, opposite & (~apart | bare)
+        return pairs[twice], pairs[thin], pairs[~twice & ~thin]
+
+    @cached_property
+    def deep(self) -> Ints:
+        """The pairs that cross by more than rounding moves a plane: places in `faces`, (k, 2)."""
+        pairs = join_pairs(self.crossing)
+        if self.faces is None or not len(pairs):
+            return pairs
+        a, b = self.faces.corners_of(*pairs.T)
+        reach = np.minimum(_reaches(a, b).min(axis=0), _reaches(b, a).min(axis=0))
+        one, other, holder = self.faces.corners_of(*self.leaned.T)
+        sides = [_reaches(of, holder).max(axis=0) for of in (one, other)]
+        reach[len(pairs) - len(self.leaned) :] = np.minimum(*sides)
+        return pairs[reach > self.faces.rounding[pairs].max(axis=1)]
+
+
+def _reaches(a: Floats, b: Floats) -> Floats:
+    """Return how far the faces `a` reach to either side of the planes of the faces `b`, (n, 3, 3) each: (2, n) mm."""
+    normal = cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
+    height = np.einsum("ikj,ij->ik", a - b[:, :1], normal)
+    size = np.maximum(np.sqrt(np.einsum("ij,ij->i", normal, normal)), 1e-300)
+    return np.maximum([height.max(axis=1), -height.min(axis=1)], 0) / size
+
+
+def crossing_boxes(faces: Faces, pairs: Ints) -> Floats:
+    """Return the boxes (k, 2, 3) of the lines along which pairs of faces cross; those of one face are one line."""
+    a, b = faces.corners_of(*pairs.T)
+    ends = np.concatenate(_segment(a, b))
+    label = components(len(faces.original), *pairs.T)[np.tile(pairs[:, 0], 2)]
+    _, label = np.unique(label, return_inverse=True)
+    return np.stack(extents(ends, label, int(label.max()) + 1), axis=1)
+
+
+def _segment(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return the ends of the segments in which faces a, b (n, 3, 3) cross."""
+    normals = [cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0]) for of in (a, b)]
+    line = cross(*normals)
+    low, high = [], []
+    for corners, plane, normal in ((a, b, normals[1]), (b, a, normals[0])):
+        height = np.einsum("ikj,ij->ik", corners - plane[:, :1], normal)
+        before = np.roll(height, 1, axis=1)
+        crosses = (height > 0) != (before > 0)
+        share = np.where(crosses, before, 0) / np.where(crosses, before - height, 1)
+        points = np.roll(corners, 1, axis=1) + share[:, :, None] * (corners - np.roll(corners, 1, axis=1))
+        along = np.einsum("ikj,ij->ik", points, line)
+        rows = np.arange(len(points))
+        for ends, side in ((low, np.inf), (high, -np.inf)):
+            way = np.where(crosses, along, side)
+            at = np.argmin(way, axis=1) if side > 0 else np.argmax(way, axis=1)
+            ends.append((way[rows, at], points[rows, at]))
+    first = np.where((low[0][0] >= low[1][0])[:, None], low[0][1], low[1][1])
+    last = np.where((high[0][0] <= high[1][0])[:, None], high[0][1], high[1][1])
+    return first, last
 
 
 def crossings_of(topology: Topology, tick: Tick) -> Crossings:
@@ -178,7 +267,8 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
         return Crossings()
     tick()
     faces = _prepared(topology, order)
-    crossings = Crossings(faces, Contacts(topology.n_shells, max(MOST_CONTACTS, 2 * len(order))))
+    contact, near = (Contacts(topology.n_shells, max(MOST_CONTACTS, 2 * len(order))) for _ in range(2))
+    crossings = Crossings(faces, contact, near)
     slabs, waiting = slabs_of(steps, *faces.corners), list[Pairs]()
     try:
         pairs = meeting_pairs(boxes.take(order, axis=0), tick)
@@ -192,6 +282,7 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
     except Interrupted as stop:
         crossings.stopped = stop
         crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
+        crossings.near.noted.clear()
     _leaning(crossings)
     return crossings
 
@@ -223,8 +314,9 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
     normal = columns_of(topology.stored_areas, order)
     edges = topology.edges if stored is topology.mesh.faces else edges_of(stored, len(vertices))
     places = same_place(vertices).take(corners) if several and topology.mesh.indexed else corners
+    rounding = STEPS * float32_steps(vertices[corners.T])
     with ThreadPoolExecutor(1) as thread:
-        planes = _submit(thread, planes_of, columns, places, normal)
+        planes = _submit(thread, planes_of, columns, places, normal, rounding)
         smooth = height_fields(columns, corners, normal, surrounded_vertices(edges, len(vertices)))
     return Faces(
         vertices,
@@ -234,6 +326,7 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
         topology.shells[order],
         topology.kept[order],
         several,
+        rounding,
     )
 
 
@@ -261,39 +354,53 @@ def _decide(faces: Faces, waiting: list[Pairs], crossings: Crossings) -> None:
         raise TooMany(most, "faces")
     blocks = [slice(start, start + _PAIRS) for start in range(0, len(i), _PAIRS)]
     sieved = [_sieved(faces, i[block], j[block]) for block in blocks]
-    open_, flush, shared = (np.concatenate(part) for part in zip(*sieved, strict=True))
+    open_, flush, lying, shared = (np.concatenate(part) for part in zip(*sieved, strict=True))
     twice = np.flatnonzero(shared == 3)  # in one place: a face that the file lists twice, or another one
     if faces.planes.ids is not faces.corners:
         twice = twice[_common(*(faces.corners.take(f[twice], axis=1) for f in (i, j))) == 3]
-    open_[twice] = False
+    open_[twice] = lying[twice] = False
+    some = np.flatnonzero(lying)
+    some = some[lapping(*faces.corners_of(i[some], j[some]), faces.rounding[i[some]])]
+    crossings.lying.append(np.stack([i[some], j[some]], axis=1))
+    crossings.kept += len(some)
     if faces.several:
+        crossings.near.add(faces.shell, i[some], j[some])
         some = np.flatnonzero(~open_ & (shared > 0))
         crossings.contact.add(faces.shell, i[some], j[some])
         some = np.flatnonzero(flush)
         some = some[crossings.contact.unknown(faces.shell, i[some], j[some])]
-        touch = some[predicates.meet(*(faces.vertices[faces.corners[:, f[some]].T] for f in (i, j))).touches]
+        touch = some[predicates.meet(*faces.corners_of(i[some], j[some])).touches]
         crossings.contact.add(faces.shell, i[touch], j[touch])
+        some = np.flatnonzero(~open_ & (shared == 0))
+        some = some[crossings.contact.unknown(faces.shell, i[some], j[some])]
+        some = some[crossings.near.unknown(faces.shell, i[some], j[some])]
+        some = some[within(*faces.corners_of(i[some], j[some]), faces.rounding[i[some]])]
+        crossings.near.add(faces.shell, i[some], j[some])
     left = np.flatnonzero(open_)
     _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
 
-def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Bools, Bools, Ints]:
-    """Return which pairs of faces may cross or overlap, which others may touch, and how many corners they share."""
+def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Bools, Bools, Bools, Ints]:
+    """Return which pairs of faces may cross, may touch, and may lie on each other, and how many corners they share."""
     planes = faces.planes
+    larger = planes.near.take(i) >= planes.near.take(j)  # rounding tilts the plane of a small face
+    i, j = np.where(larger, i, j), np.where(larger, j, i)
     ids_a, ids_b = planes.vertices(i), planes.vertices(j)
     common = _common(ids_a, ids_b)
-    clear = planes.one_side(i, ids_b, common)
+    clear, lying = planes.one_side(i, ids_b, common)
     left = np.flatnonzero(~clear)
-    clear[left] = planes.one_side(j[left], ids_a.take(left, axis=1), common[left])
+    clear[left], _ = planes.one_side(j[left], ids_a.take(left, axis=1), common[left])
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
-    edge = np.flatnonzero((common >= 2) & ~clear)
+    edge = np.flatnonzero((common >= 2) & (~clear | lying))
     if len(edge):
-        clear[edge] = (facing(faces, i[edge], j[edge]) > 0) & ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+        onwards = (facing(faces, i[edge], j[edge]) > 0) & ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+        clear[edge] |= onwards
+        lying[edge] &= ~onwards
     left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
     flush = np.zeros(len(i), bool)
     flush[left] = clear[left] = _flush(a, b)
-    return ~clear, flush & (common == 0), common
+    return ~clear, flush & (common == 0), lying, common
 
 
 def _flush(a: Floats, b: Floats) -> Bools:
@@ -322,19 +429,16 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
     """Decide pairs of faces by exact signs; `shared` (n,) counts their common corners."""
     if not len(i):
         return
-    pair, overlaps, meets = np.stack([i, j], axis=1), shared == 3, shared > 0
-    a, b = (faces.vertices[faces.corners[:, f].T] for f in (i, j))
-    some = np.flatnonzero(~overlaps)  # others are in one place
+    pair, meets = np.stack([i, j], axis=1), shared > 0
+    a, b = faces.corners_of(i, j)
+    some = np.flatnonzero(shared < 3)  # others are in one place
     meeting = predicates.meet(a[some], b[some])
-    overlaps[some] = meeting.overlaps
-    wide = np.flatnonzero(overlaps)
-    crossings.covering.append(pair[wide[wide_pairs(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
         crossings.contact.add(faces.shell, i[meets], j[meets])
     crossing = some[meeting.crosses & (shared[some] < 2)]
     crossings.crossing.append(pair[crossing])
-    crossings.kept += len(crossing) + len(wide)
+    crossings.kept += len(crossing)
     in_b, in_a = (
         np.flatnonzero(((side == 0).sum(axis=1) == 2) & (shared[some] < 2)) for side in (meeting.side_a, meeting.side_b)
     )
@@ -373,113 +477,10 @@ def _leaning(crossings: Crossings) -> None:
     rows = rows[np.lexsort(rows.T[[3, 2, 1, 0]])]
     same = (rows[1:, :3] == rows[:-1, :3]).all(axis=1) & (rows[1:, 3] != rows[:-1, 3])
     through = np.flatnonzero(same)
-    crossings.crossing.append(rows[through][:, [4, 0]].astype(np.int32))
+    crossings.leaned = np.stack([rows[through, 4], rows[through + 1, 4], rows[through, 0]], axis=1).astype(np.int32)
+    crossings.crossing.append(crossings.leaned[:, [0, 2]])
 
 
 def join_pairs(blocks: list[Ints]) -> Ints:
     """Return the pairs of all blocks, (k, 2)."""
     return np.concatenate(blocks) if blocks else np.empty((0, 2), np.int32)
-
-
-MOST_DEPTHS = 20_000
-"""Pairs whose depth is worked out; more of them are no rounding."""
-_MOST_NEIGHBOURS = 4_000_000
-_STEPS = 4  # float32 steps: no less is told from rounding
-_SEEN = 3  # pairs in which one fold shows
-_PART = 0.1  # of a face: of finer faces none reaches deep, though all of them together do
-
-
-def crossing_depths(vertices: Floats, corners: Ints, pairs: Ints, least: float) -> Floats:
-    """Return how deep pairs of faces (n, 2) that cross reach through each other, mm; infinity if that is not shallow.
-
-    A face reaches through another's plane as far as the neighbours of its corners there do. `corners` (3, m) are the
-    faces' vertices. No depth above `least` (mm) or a tenth of the face is shallow, unless float32 steps are larger.
-    """
-    depth = np.full(len(pairs), np.inf)
-    for face, holder in (pairs.T, pairs.T[::-1]) if 0 < len(pairs) <= MOST_DEPTHS else ():
-        a, b = (vertices[corners[:, f].T] for f in (face, holder))
-        depth = np.minimum(
-            depth, _shallow(_beyond(vertices, corners, face, a, b), a, b, np.sqrt(max_side_squared(a)), least)
-        )
-    return depth
-
-
-def _shallow(depth: Floats, a: Floats, b: Floats, size: Floats, least: float) -> Floats:
-    steps = float32_steps(np.concatenate([a, b], axis=1))
-    return np.where(depth <= np.maximum(_STEPS * steps, np.minimum(least, _PART * size)), depth, np.inf)
-
-
-def _beyond(vertices: Floats, corners: Ints, face: Ints, a: Floats, b: Floats) -> Floats:
-    """Return how far the surface round each face (n,), with corners `a`, reaches to the nearer side of b's plane.
-
-    It is without end if vertices have too many neighbours to look at.
-    """
-    normal = cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    near, first, count = _neighbours(corners, np.unique(corners[:, face]), len(vertices))
-    seeds = corners[:, face].T.reshape(-1)
-    if int(count[seeds].sum()) > _MOST_NEIGHBOURS:
-        return np.full(len(face), np.inf)
-    row = np.repeat(np.arange(len(seeds)), count[seeds])
-    place = np.arange(len(row)) - np.repeat(np.cumsum(count[seeds]) - count[seeds], count[seeds])
-    pair = row // 3
-    away = np.einsum("ij,ij->i", vertices[near[first[seeds][row] + place]] - b[pair, 0], normal[pair])
-    own = np.einsum("ikj,ij->ik", a - b[:, :1], normal)
-    step = float32_steps(np.concatenate([a, b], axis=1))[:, None]
-    reach = np.zeros((2, len(face)))
-    for side, sign in enumerate((1.0, -1.0)):
-        there = (sign * own >= -step).reshape(-1)[row]
-        np.maximum.at(reach[side], pair[there], sign * away[there])
-    return reach.min(axis=0)
-
-
-def _neighbours(corners: Ints, asked: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """Return the vertices that share a face with those `asked`, themselves included; of each the first, how many."""
-    wanted = np.zeros(n, bool)
-    wanted[asked] = True
-    some = corners[:, wanted[corners].any(axis=0)]
-    start = np.concatenate([np.repeat(corner, 3) for corner in some])
-    end = np.concatenate([some.T.reshape(-1)] * 3)
-    order = sorted_with_order(start.astype(np.uint64), max(n, 1).bit_length())[1]
-    count = np.bincount(start, minlength=n)
-    return end[order], np.cumsum(count) - count, count
-
-
-def covering_depths(vertices: Floats, corners: Ints, pairs: Ints, least: float) -> Floats:
-    """Return how deep pairs of faces (n, 2) in one plane cover each other, mm; infinity if that is not shallow.
-
-    A pair's depth is the way in the plane by which the faces come apart, or the mean
-    width that all faces together cover of one of the two, by fold, if that is more. The others are as in
-    `crossing_depths`.
-    """
-    if not 0 < len(pairs) <= MOST_DEPTHS:
-        return np.full(len(pairs), np.inf)
-    a, b = (vertices[corners[:, f].T] for f in pairs.T)
-    normals = [cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0]) for of in (a, b)]
-    double = [np.linalg.norm(normal, axis=1) for normal in normals]
-    normal = np.where((double[0] >= double[1])[:, None], *normals)
-    depth = np.min([_overlap(a, b, axis) for axis in _across(a, b, normal)], axis=0)
-    longest = [np.sqrt(max_side_squared(of)) for of in (a, b)]
-    strip, both = depth * np.minimum(*longest), pairs.T.reshape(-1)
-    covered = np.bincount(both, np.concatenate([strip, strip]))[pairs] / _SEEN
-    depth = np.max([depth, covered[:, 0] / longest[0], covered[:, 1] / longest[1]], axis=0)
-    height = np.maximum(double[0] / longest[0], double[1] / longest[1])
-    return _shallow(depth, a, b, height, least)
-
-
-def folded(low: Floats, high: Floats, least: float) -> Floats:
-    """Return `low`, the lesser height of two faces that fold onto each other, or infinity if that is not shallow."""
-    return np.where(low <= np.minimum(least, _PART * high), low, np.inf)
-
-
-def _across(a: Floats, b: Floats, normal: Floats) -> Iterator[Floats]:
-    """Yield unit vectors in the plane square to each side of both faces."""
-    for of in (a, b):
-        for k in range(3):
-            axis = cross(of[:, k] - of[:, k - 1], normal)
-            yield axis / np.maximum(np.linalg.norm(axis, axis=1), 1e-300)[:, None]
-
-
-def _overlap(a: Floats, b: Floats, axis: Floats) -> Floats:
-    one, other = (np.einsum("ikj,ij->ik", of - a[:, :1], axis) for of in (a, b))
-    return np.minimum(one.max(axis=1) - other.min(axis=1), other.max(axis=1) - one.min(axis=1))

@@ -68,7 +68,8 @@ class Planes:
     """Faces by their corners and planes.
 
     `columns` (3, n): the coordinates of vertices; `ids` (3, m): the vertices of the faces; `normal` (3, m): twice their
-    area vectors; `offset` and `error` (m,): normal * point - offset is right to within the error.
+    area vectors; `offset` and `error` (m,): normal * point - offset is right to within the error. `near` (m,) is what
+    it is at the height that rounding may give a point of the plane.
     """
 
     columns: Floats
@@ -76,6 +77,7 @@ class Planes:
     normal: Floats
     offset: Floats
     error: Floats
+    near: Floats
 
     def vertices(self, i: Ints) -> Ints:
         """Return the vertices of faces i: (corner, n), to take with."""
@@ -89,14 +91,15 @@ class Planes:
                 column.take(at, mode="clip", out=corners[k, axis])
         return corners
 
-    def one_side(self, i: Ints, others: Ints, shared: Ints) -> Bools:
+    def one_side(self, i: Ints, others: Ints, shared: Ints) -> tuple[Bools, Bools]:
         """Return whether the vertices `others` (corner, n) of faces are on one side of the plane of each face i.
 
-        0 to 3 of them are `shared`, and left out.
+        0 to 3 of them are `shared`, and left out. Also return whether all of them are near the plane.
         """
         x, y, z = (row.take(i, mode="clip") for row in self.normal)
         offset, error = self.offset.take(i, mode="clip"), self.error.take(i, mode="clip")
         above, below = np.zeros((2, len(i)), np.int8)
+        farthest = np.zeros(len(i))
         for at in others:
             height = self.columns[0].take(at, mode="clip")
             height *= x
@@ -107,11 +110,16 @@ class Planes:
             height -= offset
             above += height > error
             below += height < -error
-        return ((above == 0) | (below == 0)) & (above + below >= 3 - shared) & (shared < 3)
+            np.maximum(farthest, np.abs(height, out=height), out=farthest)
+        clear = ((above == 0) | (below == 0)) & (above + below >= 3 - shared) & (shared < 3)
+        return clear, farthest <= self.near.take(i, mode="clip")
 
 
-def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
-    """Return the planes of faces from vertices (3, n), their ids (3, m) and their `area_vectors` (3, m)."""
+def planes_of(columns: Floats, ids: Ints, normal: Floats, rounding: Floats) -> Planes:
+    """Return the planes of faces from vertices (3, n), their ids (3, m) and their `area_vectors` (3, m).
+
+    `rounding` (m,): the height that rounding may give a point of a plane, mm.
+    """
     low, high = columns.min(axis=1), columns.max(axis=1)
     offset, longest = np.zeros((2, ids.shape[1]))
     for axis, column in enumerate(columns):
@@ -123,7 +131,7 @@ def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
     longest *= longest
     longest *= _PLANE * float(np.maximum(-low, high).max())
     longest += _TINY
-    return Planes(columns, ids, normal, offset, longest)
+    return Planes(columns, ids, normal, offset, longest, rounding * np.sqrt(dot(normal, normal)) + longest)
 
 
 _SOUND = 1e-9  # of the squared longest side: faces with less area have no direction worth adding to a mean

@@ -13,8 +13,10 @@ import numpy as np
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, extent, extents, sorted_with_order
 from unitcad.geometry.boxes import Tick, TooMany, box_pairs
 from unitcad.geometry.components import components
-from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
+from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_step, float32_steps, same_place
+from unitcad.meshcheck.geometry.resolution import Resolution, resolution_of
 
+_ALONG = 0.1  # cosine: edges that run more alike are not the two sides of a crack
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 
@@ -222,7 +224,6 @@ def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
     return half[~ends], half[ends]
 
 
-WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex
 _CROWD = 30  # points within reach of a vertex, itself too: more means points that lie everywhere, not a seam
 
@@ -231,52 +232,32 @@ _CROWD = 30  # points within reach of a vertex, itself too: more means points th
 class Seams:
     """Faces with vertices joined: in `stored` those in one place, in `joined` also those within reach.
 
-    `whole` are the faces that keep three vertices in `stored`. `reach`: how near to a vertex another one counts as the
-    same, mm; 0 where the vertex is on no open edge.
+    `whole` are the faces that keep three vertices in `stored`. `gap` is the largest distance joined, mm.
     """
 
     stored: Ints
     joined: Ints
     whole: Bools
-    reach: Floats
+    gap: float
 
 
-def join(vertices: Floats, faces: Ints, loose: Ints, tick: Tick) -> Seams:
+def join(vertices: Floats, faces: Ints, loose: Ints, thin: float, tick: Tick) -> Seams:
     """Join the vertices `loose` (those of open edges).
 
-    Two are joined where they are nearer than a tenth of the shortest edge at either, and than 1e-5 of the diagonal of
-    their shell (or two float32 steps). A shell is here what faces and these joins connect: of all ways to choose it the
-    largest that agrees with itself. No face collapses: joins that would do that are left out.
+    Two are joined where they are nearer than a tenth of the shortest edge at either, and than `thin` mm (or two float32
+    steps). No face collapses: joins that would do that are left out.
     """
-    n = len(vertices)
-    place = np.arange(n, dtype=np.int32)
+    place = np.arange(len(vertices), dtype=np.int32)
     place[loose] = loose[same_place(vertices[loose])]
     stored = place[faces]
     whole = _three(stored)
     points = np.unique(place[loose])
     short = _shortest_edges(vertices, stored[whole], points)
-    step = 2 * float32_steps(vertices[points])
-    part = connected_parts(stored, n)
-    boxes = extents(vertices, part, int(part.max()) + 1)
-    mine = part[points]
-
-    def reaches(shell: Ints) -> Floats:
-        low = extents(boxes[0][mine], shell[mine], len(shell))[0]
-        high = extents(boxes[1][mine], shell[mine], len(shell))[1]
-        size = np.linalg.norm((high - low)[shell[mine]], axis=1)
-        return np.minimum(NARROW * short, np.maximum(WELD * size, step))
-
-    reach = reaches(np.zeros(len(boxes[0]), np.int64))
-    pairs, distance = _near(vertices[points], reach, tick)
-    while True:
-        reach = reaches(components(len(boxes[0]), mine[pairs[:, 0]], mine[pairs[:, 1]]))
-        fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
-        if fits.all():
-            break
-        pairs, distance = pairs[fits], distance[fits]
-    everywhere = np.zeros(n)
-    everywhere[points] = reach
-    return Seams(stored, _joined(place, stored, points, pairs), whole, everywhere)
+    reach = np.minimum(NARROW * short, np.maximum(thin, 2 * float32_steps(vertices[points])))
+    target = _joined(place, stored, points, _near(vertices[points], reach, tick))
+    moved = np.flatnonzero(target != np.arange(len(target)))
+    away = vertices[moved] - vertices[target[moved]]
+    return Seams(stored, target[stored], whole, float(np.sqrt(np.einsum("ij,ij->i", away, away)).max(initial=0)))
 
 
 def _three(faces: Ints) -> Bools:
@@ -301,8 +282,8 @@ def _shortest_edges(vertices: Floats, faces: Ints, points: Ints) -> Floats:
     return short[points]
 
 
-def _near(points: Floats, reach: Floats, tick: Tick) -> tuple[Ints, Floats]:
-    """Return pairs of points within both their reaches, and their distances; none of a crowd."""
+def _near(points: Floats, reach: Floats, tick: Tick) -> Ints:
+    """Return pairs of points within both their reaches; none of a crowd."""
     half = reach[:, None] / 2
     try:
         pairs = box_pairs(points - half, points + half, tick)
@@ -312,11 +293,11 @@ def _near(points: Floats, reach: Floats, tick: Tick) -> tuple[Ints, Floats]:
     fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
     if len(points) + 2 * np.count_nonzero(fits) > _CROWD * len(points):
         fits[:] = False
-    return pairs[fits], distance[fits]
+    return pairs[fits]
 
 
 def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
-    """Return the faces with the points of each group of pairs made one, but for groups that would collapse a face."""
+    """Return what each vertex becomes if each group of pairs is made one, but for groups that would collapse a face."""
     group = components(len(points), pairs[:, 0], pairs[:, 1])
     _, first = np.unique(group, return_index=True)
     target = np.arange(len(place), dtype=np.int32)
@@ -326,46 +307,49 @@ def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
     if len(spoilt):
         back = np.isin(target, spoilt)
         target[back] = np.flatnonzero(back)
-        joined = target[stored]
-    return joined
+    return target
 
 
-def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: Floats) -> Bools:
-    """Return which open edges (low, high) have another vertex of the open border on them, within its `reach`.
+def cracks(vertices: Floats, start: Ints, end: Ints, thin: float, tick: Tick) -> tuple[Bools, float]:
+    """Return which open edges belong to a border that lies along itself within `thin` mm, and the largest width there.
 
-    Where a long open edge meets a chain of short ones, the first short one starts at an end of the long one and lies
-    along it; so only open edges that share a vertex are compared.
+    Each edge runs from `start` to `end`, as its face does. A border is what open edges connect; on a crack both ends
+    and the middle of each of its edges lie at other edges that do not run the same way.
     """
-    n = len(low)
-    here = np.concatenate([low, high])
-    there = np.concatenate([high, low])
-    edge = np.concatenate([np.arange(n), np.arange(n)])
-    order = np.argsort(here, kind="stable")
-    here, there, edge = here[order], there[order], edge[order]
-    hit = np.zeros(n, bool)
-    for shift in range(1, 9):
-        if shift >= len(here):
-            break
-        together = np.flatnonzero(here[shift:] == here[:-shift])
-        if not len(together):
-            break
-        for a, b in ((together, together + shift), (together + shift, together)):
-            near = reach[here[a]]
-            origin = vertices[here[a]]
-            along = vertices[there[a]] - origin
-            other = vertices[there[b]] - origin
-            length = np.linalg.norm(along, axis=1)
-            part = np.einsum("ij,ij->i", along, other) / np.maximum(length, 1e-300)
-            off = np.linalg.norm(other - along * (part / np.maximum(length, 1e-300))[:, None], axis=1)
-            on = (off <= near) & (part > near) & (part < length - near)
-            hit[edge[a[on]]] = True
-    return hit
+    n = len(start)
+    thin = max(thin, 2 * float32_step(vertices[start]))
+    ends = np.stack([vertices[start], vertices[end]], axis=1)
+    try:
+        pairs = box_pairs(ends.min(axis=1) - thin / 2, ends.max(axis=1) + thin / 2, tick)
+    except TooMany:
+        return np.zeros(n, bool), 0.0
+    along = ends[:, 1] - ends[:, 0]
+    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    facing = np.einsum("ij,ij->i", along[one], along[other]) <= _ALONG * np.sqrt(square[one] * square[other])
+    one, other = one[facing], other[facing]
+    away = np.full((3, n), np.inf)
+    for k, point in enumerate((ends[:, 0], ends[:, 1], ends.mean(axis=1))):
+        off = point[one] - ends[other, 0]
+        share = np.clip(np.einsum("ij,ij->i", off, along[other]) / square[other], 0, 1)
+        off -= share[:, None] * along[other]
+        np.minimum.at(away[k], one, np.sqrt(np.einsum("ij,ij->i", off, off)))
+    width = away.max(axis=0)
+    used, ids = np.unique(np.concatenate([start, end]), return_inverse=True)
+    border = components(len(used), ids[:n], ids[n:])[ids[:n]]
+    crack = np.bincount(border[width > thin], minlength=int(border.max(initial=0)) + 1)[border] == 0
+    return crack, float(width[crack].max(initial=0))
 
 
-def closed_shells(edges: Edges, shells: Ints, n: int) -> Bools:
-    """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
-    inside = np.ones(n, bool)
-    inside[shells[edges.order[np.repeat(~edges.balanced, edges.size)] // 3]] = False
+def closed_shells(edges: Edges, shells: Ints, n: int, but: Ints | None = None) -> Bools:
+    """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other.
+
+    `but`: edges that have no say.
+    """
+    inside, odd = np.ones(n, bool), ~edges.balanced
+    if but is not None:
+        odd[but] = False
+    inside[shells[edges.order[np.repeat(odd, edges.size)] // 3]] = False
     return inside
 
 
@@ -401,15 +385,18 @@ def side_by_side(one: Floats, other: Floats) -> Bools:
 class OpenEdges:
     """Edges of one face, before vertices were welded and after it.
 
-    `edges` are those before, of the faces `kept`; of them `shut` are the ones that welding closes. `left` are edges of
-    the welded faces that are open still; `split` says which of those have a vertex in between.
+    `edges` are those before, of the faces `kept`; of them `shut` are the ones that welding closes, and `gap` is how far
+    it moves a vertex, mm. `left` are edges of the welded faces that are open still; `crack` says which of those lie
+    along each other, `wide` mm apart at most.
     """
 
     edges: Edges
     kept: Ints
     shut: Ints
+    gap: float
     left: Ints
-    split: Bools
+    crack: Bools
+    wide: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -420,7 +407,8 @@ class Topology:
     moved any, with vertices in one place joined. `repeated` are the file's faces that use a vertex twice, `unused`
     counts vertices that no face uses, `opened` has the edges of one face, if any.
     `shells` labels faces, `turns` has those round edges of four and more. `low` and `high`: each shell's box, mm;
-    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
+    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside,
+    `sealed`: whether it has one but for cracks. `resolution`: sizes that a printer shows.
     `pinched` are vertices of several fans, `twice` faces with the vertices of another one, `unbalanced` edges of an
     even number of faces along which more run one way than the other.
     """
@@ -440,6 +428,8 @@ class Topology:
     high: Floats
     volumes: Floats
     closed: Bools
+    sealed: Bools
+    resolution: Resolution
     pinched: Ints
     twice: Ints
     unbalanced: Ints
@@ -472,8 +462,9 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     edges = edges_of(faces, len(vertices))
     tick()
     stored, opened = faces, None
+    resolution = resolution_of(float(np.ptp(extent(vertices), axis=0).max()) if len(vertices) else 0.0)
     if (edges.size == 1).any():
-        faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges, tick)
+        faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges, resolution.thin, tick)
         tick()
     areas, turns = area_vectors(vertices, faces), turns_of(vertices, faces, edges)
     tick()
@@ -485,6 +476,9 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     else:
         low, high = extents(vertices[faces].reshape(-1, 3), np.repeat(shells, 3), n)
     volumes, closed = signed_volumes(vertices, faces, areas, shells, n), closed_shells(edges, shells, n)
+    sealed = closed
+    if opened is not None and opened.crack.any():
+        sealed = closed_shells(edges, shells, n, opened.left[opened.crack])
     tick()
     pinched = pinched_vertices(faces, edges, len(vertices))
     tick()
@@ -508,9 +502,32 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
         high,
         volumes,
         closed,
+        sealed,
+        resolution,
         pinched,
         twice,
         np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced),
+    )
+
+
+def by_place(topology: Topology) -> Topology:
+    """Return a topology whose vertices in one place are one: its faces, edges, shells and turns, nothing else of it."""
+    mesh = topology.mesh
+    place = same_place(mesh.vertices) if mesh.indexed else np.arange(0)
+    if np.array_equal(place, np.arange(len(place))):
+        return topology
+    faces = place[mesh.faces]
+    whole = _three(faces)
+    faces = faces[whole]
+    edges = edges_of(faces, len(mesh.vertices))
+    return replace(
+        topology,
+        mesh=replace(mesh, faces=faces),
+        kept=topology.kept[whole],
+        shells=topology.shells[whole],
+        areas=topology.areas[whole],
+        edges=edges,
+        turns=turns_of(mesh.vertices, faces, edges),
     )
 
 
@@ -526,12 +543,12 @@ def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
 
 
 def _welded(
-    vertices: Floats, faces: Ints, kept: Ints, edges: Edges, tick: Tick
+    vertices: Floats, faces: Ints, kept: Ints, edges: Edges, thin: float, tick: Tick
 ) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
     """Return the faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
 
     open_ = np.flatnonzero(edges.size == 1)
-    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])), tick)
+    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])), thin, tick)
     joined, stored, whole = seams.joined, seams.stored, seams.whole
     if not whole.all():
         joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]
@@ -541,13 +558,15 @@ def _welded(
         stored = joined
     after = edges_of(joined, len(vertices))
     left = np.flatnonzero(after.size == 1)
-    shut, split = open_, np.zeros(len(left), bool)
+    shut, crack, wide = open_, np.zeros(0, bool), 0.0
     if len(left):  # only what belongs to shells without a boundary left
         part = connected_parts(joined, len(vertices))
         at = seams.joined[edges.order[edges.first[open_]] // 3, 0]
         shut = open_[~np.isin(part[at], part[after.low[left]])]
-        split = t_junctions(vertices, after.low[left], after.high[left], seams.reach)
-    return joined, stored, whole_kept, after, OpenEdges(edges, kept, shut, left, split)
+        half = after.order[after.first[left]]
+        start, end = (joined[half // 3, (half % 3 + k) % 3] for k in (0, 1))
+        crack, wide = cracks(vertices, start, end, thin, tick)
+    return joined, stored, whole_kept, after, OpenEdges(edges, kept, shut, seams.gap, left, crack, wide)
 
 
 def diagonals(low: Floats, high: Floats) -> Floats:
@@ -586,3 +605,22 @@ def max_side_squared(corners: Floats) -> Floats:
         side = corners[:, k] - corners[:, k - 1]
         np.maximum(longest, np.einsum("ij,ij->i", side, side), out=longest)
     return longest
+
+
+def small_patches(topology: Topology, which: Ints) -> Bools:
+    """Return which of some edges border a patch of faces that no printer shows: short, or narrower than `thin` on
+    average.
+
+    A patch is what edges of two faces connect that run along them in opposite directions.
+    """
+    edges, faces, limits = topology.edges, topology.mesh.faces, topology.resolution
+    sound = edges.first[(edges.size == 2) & edges.balanced]
+    patch = components(len(faces), edges.order[sound] // 3, edges.order[sound + 1] // 3)
+    n = int(patch.max(initial=-1)) + 1
+    area = np.bincount(patch, np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)), n) / 2
+    across = diagonals(*extents(topology.mesh.vertices[faces].reshape(-1, 3), np.repeat(patch, 3), n))
+    small = (across < limits.feature) | (2 * area < limits.thin * across)
+    there = np.repeat(np.arange(len(which)), edges.size[which])
+    place = np.arange(len(there)) - np.repeat(np.cumsum(edges.size[which]) - edges.size[which], edges.size[which])
+    faces_there = edges.order[edges.first[which][there] + place] // 3
+    return np.bincount(there, small[patch[faces_there]], len(which)) > 0

@@ -62,8 +62,8 @@ F006 = Rule("""
 """)
 
 F007 = Rule("""
-    F007 warning: binary header starts with solid
-    Programs that look only at the first word take the file for text and refuse it.
+    F007 info: binary header starts with solid
+    Programs that look only at the first word take the file for text. Slicers compare the size with the facet count.
     Example: The header of a binary STL reads `solid part1`.
     Fix: Write a header that starts with anything else.
 """)

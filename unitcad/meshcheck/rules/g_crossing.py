@@ -2,52 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints, among
+from unitcad.geometry.arrays import Ints, among
 from unitcad.meshcheck.findings import Finding, Location, counted, most_locations, point
-from unitcad.meshcheck.geometry.crossings import (
-    Crossings,
-    Faces,
-    covering_depths,
-    crossing_depths,
-    facing,
-    folded,
-    folded_edges,
-    join_pairs,
-    kinds,
-    through_edges,
-)
-from unitcad.meshcheck.geometry.mesh import float32_step, same_place
+from unitcad.meshcheck.geometry.crossings import Faces, join_pairs
+from unitcad.meshcheck.geometry.mesh import float32_step
 from unitcad.meshcheck.geometry.predicates import common_point
-from unitcad.meshcheck.geometry.topology import edges_of, turns_of
-from unitcad.meshcheck.rules.g_shells import SPECK
 from unitcad.meshcheck.rules.inspection import Inspection, at_edges
 from unitcad.meshcheck.rules.registry import Rule
+from unitcad.meshcheck.rules.severity import by_layers, by_width
 
 G001 = Rule("""
     G001 error: self-crossing
-    Two faces pass through each other. Decided exactly: touching is not crossing. A warning, unless --strict is given,
-    if they do so by no more than 0.02 mm or four float32 steps; the message gives the depth. In a 3MF file a warning,
-    since the core specification (4.1) defines what is solid.
+    Two faces pass through each other. Decided exactly: touching is not crossing. What they enclose is solid or hollow
+    by the fill rule of a slicer: even-odd, nonzero and positive filling differ. A warning, unless --strict is given, if
+    a printer cannot show the difference: it is less than 0.02 mm thick, or less than 0.2 mm wide in one of the two
+    directions across. Ignored if it is below four float32 steps. In a 3MF file a warning, since the core specification
+    (4.1) defines what is solid.
     Example: A bolt passes through a wall and is not united with it.
     Fix: Unite the bodies with a boolean, or move the surfaces apart.
 """)
 
 G003 = Rule("""
     G003 warning: shells touch
-    Two shells meet in a point, line or face and do not pass through each other there. The shared volume is a millionth
-    of the smaller one at most; if it is more, G002 applies too. Rounding decides whether they print as one.
+    Two shells meet in a point, line or face, to within four float32 steps, and do not pass through each other, or by
+    less than 0.001 mm. Rounding decides whether they print as one.
     Example: The tip of a cone meets the top of a box.
     Fix: Overlap them and unite, or leave a gap.
 """)
 
 G004 = Rule("""
     G004 warning: coplanar overlap
-    Two faces lie in one plane and cover each other in part.
+    Two faces of different shells lie in one plane and cover each other in part.
     Example: A box stands on a larger one: its underside covers a part of the other's top.
     Fix: Unite the bodies with a boolean.
 """)
@@ -56,17 +46,18 @@ G008 = Rule("""
     G008 error: shell overlaps itself
     A shell passes through itself along edges that four or more of its faces share, or two of its faces cover each other
     in one plane and look the same way: its winding number takes another value than 0 and 1, such as 2 in the middle of
-    a pentagram or -1 in one half of a bow tie. A warning, unless --strict is given, if two faces cover each other by no
-    more than 0.02 mm. In a 3MF file a warning, since the core specification (4.1) says what is solid.
+    a pentagram or -1 in one half of a bow tie. A warning if a printer cannot show it, as in G001. In a 3MF file a
+    warning, since the core specification (4.1) says what is solid.
     Example: A prism stands on a pentagram that is drawn in one stroke.
     Fix: Unite the body with itself by a boolean, or correct the outline that it was made from.
 """)
 
 G009 = Rule("""
     G009 error: wall or gap without thickness
-    Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids that lie side
-    by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also if two neighbours fold onto each other
-    to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than 0.02 mm.
+    Two faces cover each other to within four float32 steps and look opposite ways, and they do not belong to two solids
+    that lie side by side: a fin, a fold, a crack, or a cavity that reaches the surface. A warning, unless --strict is
+    given, if no circle of 0.2 mm fits into the place, or if material lies on both sides, so that a slicer fills the
+    gap.
     Example: A fin is drawn as one surface and exported with both of its sides.
     Fix: Give the wall or the gap a thickness, or remove both faces.
 """)
@@ -78,67 +69,49 @@ _LISTED = 16  # pairs whose places are computed, unless more are kept: some fall
 def check_mesh(part: Inspection) -> Iterator[Finding]:
     """Apply the rules to all pairs of faces, then along the edges."""
     crossings = part.crossings
-    if crossings.faces is not None:
-        yield from _pairs(part, crossings, crossings.faces)
-        yield from _touching(crossings, crossings.faces)
+    if (faces := crossings.faces) is not None:
+        yield from _pairs(part, faces)
+        yield from _touching(part, faces)
     if crossings.stopped is not None:
         raise crossings.stopped
-    yield from _along_edges(part)
+    placed, through = part.placed, part.through
+    text = f"{counted(len(through), 'edge')} at which a shell passes through itself"
+    places = at_edges(placed.mesh.vertices, placed.edges, placed.kept, through)
+    yield from by_layers(part, G008, text, len(through), places)
+    if part.disputed.stopped is not None:
+        raise part.disputed.stopped
 
 
-def _pairs(part: Inspection, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
-    """Return pairs of faces that cross or cover each other."""
-    topology, places = part.topology, partial(_places, faces)
-    crossing, covering = join_pairs(crossings.crossing), join_pairs(crossings.covering)
-    opposite = facing(faces, covering[:, 0], covering[:, 1]) < 0
-    twice, thin = kinds(topology, faces.shell[covering], opposite)
-    other, corners = ~twice & ~thin, faces.corners
-    if topology.mesh.indexed and (len(crossing) or len(covering)):
-        corners = same_place(faces.vertices)[corners]
-    deep = crossing_depths(faces.vertices, corners, crossing, SPECK)
-    covers = covering_depths(faces.vertices, corners, covering, SPECK)
-    yield from _by_depth(part, G001, "pair", "of faces that cross", deep, crossing, places)
-    if other.any():
-        text = f"{counted(int(other.sum()), 'pair')} of faces that overlap in one plane"
-        yield G004.finding(text, int(other.sum()), places(covering[other]))
-    for rule, which, what in (
-        (G008, twice, "of faces of one shell that overlap in one plane and look the same way"),
-        (G009, thin, "of faces in one plane with nothing between them"),
-    ):
-        yield from _by_depth(part, rule, "pair", what, covers[which], covering[which], places)
+def _pairs(part: Inspection, faces: Faces) -> Iterator[Finding]:
+    """Return pairs of faces that cross or lie on each other."""
+    crossings, places = part.crossings, partial(_places, faces)
+    crossing = join_pairs(crossings.crossing) if part.strict else crossings.deep
+    twice, thin, other = crossings.kinds(part.topology)
+    text = f"{counted(len(crossing), 'pair')} of faces that cross"
+    yield from by_layers(part, G001, text, len(crossing), places(crossing))
+    if len(other):
+        text = f"{counted(len(other), 'pair')} of faces that overlap in one plane"
+        yield G004.finding(text, len(other), places(other))
+    text = f"{counted(len(twice), 'pair')} of faces of one shell that overlap in one plane and look the same way"
+    by = by_width if part.disputed.thick == 0 and not part.disputed.shows else by_layers
+    yield from by(part, G008, text, len(twice), places(twice))
+    text = f"{counted(len(thin), 'pair')} of faces in one plane with nothing between them"
+    yield from by_width(part, G009, text, len(thin), places(thin))
 
 
-def _by_depth(
-    part: Inspection,
-    rule: Rule,
-    one: str,
-    what: str,
-    depth: Floats,
-    found: Ints,
-    places: Callable[[Ints], Iterable[Location]],
-) -> Iterator[Finding]:
-    """Yield a finding of the deep ones among those `found`, and one of the shallow ones, which `depth` (mm) tells."""
-    for shallow in (False, True):
-        which = np.isfinite(depth) == shallow
-        if not which.any():
-            continue
-        text, severity = f"{counted(int(which.sum()), one)} {what}", None
-        if shallow:
-            text += f", {depth[which].max():.2g} mm deep at most"
-            severity = None if part.strict else "warning"
-        yield rule.finding(text, int(which.sum()), places(found[which]), severity)
-
-
-def _touching(crossings: Crossings, faces: Faces) -> Iterator[Finding]:
-    """Return pairs of shells whose faces meet and do not cross."""
-    contact = crossings.contact
-    keys, touching = contact.pairs()
-    first = np.flatnonzero(~among(keys, np.sort(contact.keys(*faces.shell[join_pairs(crossings.crossing)].T))))
+def _touching(part: Inspection, faces: Faces) -> Iterator[Finding]:
+    """Return pairs of shells whose faces meet, or would but for rounding, and do not cross by more."""
+    crossings = part.crossings
+    kept = zip(crossings.contact.pairs(), crossings.near.pairs(), strict=True)
+    keys, pairs = (np.concatenate(part) for part in kept)
+    keys, first = np.unique(keys, return_index=True)
+    if part.disputed.shows or part.disputed.thick >= part.topology.resolution.digit:
+        first = first[~among(keys, crossings.crossing_shells())]
     n = len(first)
     if not n:
         return
-    some = " among those compared" if contact.full else ""
-    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, _places(faces, touching[first]))
+    some = " among those compared" if crossings.contact.full or crossings.near.full else ""
+    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, _places(faces, pairs[first]))
 
 
 def _places(faces: Faces, pairs: Ints) -> list[Location]:
@@ -160,24 +133,3 @@ def _places(faces: Faces, pairs: Ints) -> list[Location]:
         named.add(first)
         by_place[near] = Location(faces=(first, second), xyz=xyz)
     return sorted(by_place.values(), key=lambda place: place.face or 0)
-
-
-def _along_edges(part: Inspection) -> Iterator[Finding]:
-    """Apply G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
-    topology = part.topology
-    mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
-    kept, shells, areas, turns = topology.kept, topology.shells, topology.areas, topology.turns
-    if mesh.indexed:
-        place = same_place(mesh.vertices)
-        if not np.array_equal(place, np.arange(len(place))):
-            faces = place[faces]
-            whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-            faces, kept, shells, areas = faces[whole], kept[whole], shells[whole], areas[whole]
-            edges = edges_of(faces, len(mesh.vertices))
-            turns = turns_of(mesh.vertices, faces, edges)
-    places = partial(at_edges, mesh.vertices, edges, kept)
-    through, (folds, low, high) = through_edges(turns, shells), folded_edges(mesh.vertices, faces, edges, areas)
-    if n := len(through):
-        yield G008.finding(f"{counted(n, 'edge')} at which a shell passes through itself", n, places(through))
-    depth = folded(low, high, SPECK)
-    yield from _by_depth(part, G009, "edge", "at which two faces fold onto each other", depth, folds, places)

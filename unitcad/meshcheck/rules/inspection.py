@@ -7,13 +7,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
+import numpy as np
+
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Location, point
-from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
+from unitcad.meshcheck.geometry.crossings import Crossings, crossing_boxes, crossings_of, through_edges
+from unitcad.meshcheck.geometry.disputed import Disputed, disputed_of
 from unitcad.meshcheck.geometry.mesh import Mesh
+from unitcad.meshcheck.geometry.nesting import Nesting, nesting_of
 from unitcad.meshcheck.geometry.rays import Rays, cast
-from unitcad.meshcheck.geometry.topology import Edges, Topology
+from unitcad.meshcheck.geometry.sheets import Sheets, sheets_of
+from unitcad.meshcheck.geometry.topology import Edges, Topology, by_place
 from unitcad.meshcheck.rules.f_file import Limits
 
 
@@ -89,6 +94,56 @@ class Inspection:
     def crossings(self) -> Crossings:
         """How its faces meet each other."""
         return crossings_of(self.topology, self.tick) if len(self.topology.kept) else Crossings()
+
+    @cached_property
+    def nesting(self) -> Nesting:
+        """How its shells lie in each other."""
+        return nesting_of(self.topology, self.crossings, self.tick)
+
+    @cached_property
+    def placed(self) -> Topology:
+        """The topology with vertices in one place as one, whether or not the file lists them apart."""
+        return by_place(self.topology)
+
+    @cached_property
+    def through(self) -> Ints:
+        """Edges of `placed` at which a shell passes through itself."""
+        return through_edges(self.placed.turns, self.placed.shells)
+
+    @cached_property
+    def disputed(self) -> Disputed:
+        """The space that slicers fill by different rules."""
+        placed, crossings, nesting = self.placed, self.crossings, self.nesting
+        stopped = crossings.stopped or nesting.stopped
+        if stopped or not self._closed(crossings):  # an open surface has no inside
+            return Disputed(shows=True, stopped=stopped)
+        overlaps = np.array(nesting.overlaps, np.int64).reshape(-1, 2)
+        low, high = self.topology.low[overlaps].max(axis=1), self.topology.high[overlaps].min(axis=1)
+        boxes, shells = [np.stack([low, high], axis=1)], [overlaps.reshape(-1)]
+        if crossings.faces is not None and len(crossings.deep):
+            boxes.append(crossing_boxes(crossings.faces, crossings.deep))
+            shells.append(crossings.faces.shell[crossings.deep].reshape(-1))
+        if len(self.through):
+            ends = np.stack([placed.edges.low[self.through], placed.edges.high[self.through]], axis=1)
+            corners = placed.mesh.vertices[ends]
+            boxes.append(np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1))
+            shells.append(placed.shells[placed.edges.order[placed.edges.first[self.through]] // 3])
+        return disputed_of(self.topology, np.unique(np.concatenate(shells)), np.concatenate(boxes), self.tick)
+
+    def _closed(self, crossings: Crossings) -> bool:
+        """Return whether the shells whose faces cross have an inside, but for cracks."""
+        if crossings.faces is None:
+            return True
+        return bool(self.topology.sealed[crossings.faces.shell[crossings.deep]].all())
+
+    @cached_property
+    def sheets(self) -> Sheets:
+        """The places at which a wall or a gap has no thickness."""
+        topology, crossings = self.topology, self.crossings
+        vertices, one, other = topology.mesh.vertices, *np.empty((2, 0, 3, 3))
+        if crossings.faces is not None:
+            one, other = crossings.faces.corners_of(*crossings.kinds(topology)[1].T)
+        return sheets_of(topology.mesh, one, other, vertices[topology.mesh.faces[topology.twice]], topology.resolution)
 
     @cached_property
     def material(self) -> Rays:

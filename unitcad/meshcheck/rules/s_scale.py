@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from unitcad.errors import WrongArgument, unknown_name
 from unitcad.geometry.arrays import extent
 from unitcad.meshcheck.findings import Facts, Finding, number
+from unitcad.meshcheck.geometry.resolution import SMALL
 from unitcad.meshcheck.rules.inspection import Inspection, Printer
 from unitcad.meshcheck.rules.registry import Rule
 
@@ -41,7 +42,7 @@ S002 = Rule("""
     Fix: Turn it, cut it, or choose another printer.
 """)
 
-SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
+LARGE = 2000.0  # mm; the largest side of a printed part
 
 
 def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:

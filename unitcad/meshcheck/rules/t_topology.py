@@ -8,23 +8,26 @@ from itertools import chain
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.meshcheck.findings import Finding, Location, counted, point
+from unitcad.meshcheck.findings import Finding, Location, counted, number, point
 from unitcad.meshcheck.geometry.mesh import Mesh, float32_step, float32_steps
 from unitcad.meshcheck.geometry.predicates import without_area
-from unitcad.meshcheck.geometry.topology import Topology, diagonals, max_side_squared
+from unitcad.meshcheck.geometry.resolution import STEPS
+from unitcad.meshcheck.geometry.topology import Topology, diagonals, max_side_squared, small_patches
 from unitcad.meshcheck.rules.inspection import Inspection, at_edges, at_faces
 from unitcad.meshcheck.rules.registry import Rule
+from unitcad.meshcheck.rules.severity import by_width
 
 T001 = Rule("""
     T001 error: boundary edge
-    An edge has one face only: the surface has a hole, so inside and outside are undefined.
+    An edge has one face only: the surface has a hole, so inside and outside are undefined. A crack of 0.02 mm or less
+    is T005. A warning for patches that no printer shows: shorter than 0.2 mm, or narrower than 0.02 mm.
     Example: A box without its lid has four.
     Fix: Close the hole in the CAD model; a slicer's repair guesses.
 """)
 
 T002 = Rule("""
     T002 error: edge with more than two faces, an odd number
-    Three or five faces meet at an edge: a loose face hangs on the surface.
+    Three or five faces meet at an edge: a loose face hangs on the surface. A warning if the patch is one of T001.
     Example: A triangle stands on an edge of a box: three faces meet there.
     Fix: Remove the inner or hanging face.
 """)
@@ -45,8 +48,9 @@ T004 = Rule("""
 """)
 
 T005 = Rule("""
-    T005 error: T-junction
-    A vertex lies on an open edge of a face that does not use it: the crack has no width, but it is one.
+    T005 warning: crack
+    Open edges lie along each other within 0.02 mm, and their vertices do not match, as at a T-junction: a vertex lies
+    on an edge of a face that does not use it. Slicers close such a crack; the message gives its width.
     Example: The upper side of a wall is one edge, and the face above has a vertex in the middle of it.
     Fix: Weld after meshing, or mesh all faces together.
 """)
@@ -54,17 +58,18 @@ T005 = Rule("""
 T006 = Rule("""
     T006 warning: closed only after welding
     Edges match only once vertices are joined that are listed apart. Two are joined if they are in one place, or nearer
-    than 1e-5 of their own shell's diagonal (or two float32 steps there) and than a tenth of the shortest edge at
-    either. So a gap wider than that stays a boundary (T001), no face collapses, and other shells of the file have no
-    influence. Crossings, stored normals and slivers are checked on the faces as stored. An error in a 3MF with
-    --3mf-strict, since the core specification (4.1) asks for common vertices.
-    Example: Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.
+    than 0.02 mm (or two float32 steps there) and than a tenth of the shortest edge at either, so no face collapses. The
+    message gives the largest distance; up to four float32 steps it is information. Crossings, stored normals and
+    slivers are checked on the faces as stored. An error in a 3MF with --3mf-strict, since the core specification (4.1)
+    asks for common vertices.
+    Example: Two halves of a ball were exported apart, and their rims differ by 0.001 mm.
     Fix: Weld vertices at export.
 """)
 
 T007 = Rule("""
     T007 error: inconsistent winding
-    Two neighbours run along their common edge in the same direction, so one of them faces inwards.
+    Two neighbours run along their common edge in the same direction, so one of them faces inwards. A warning if they
+    belong to a patch that no printer shows, as in T001.
     Example: One face of a box is flipped.
     Fix: Recalculate normals outside.
 """)
@@ -72,23 +77,24 @@ T007 = Rule("""
 T009 = Rule("""
     T009 error: duplicate face
     Two faces with an area have the same three vertices. If two closed shells are side by side there, they touch instead
-    (G003, T003).
+    (G003, T003). A warning, unless --strict is given, if no circle of 0.2 mm fits into them, or if material lies on
+    both sides.
     Example: The lid of a box is in the file twice.
     Fix: Remove one, or both if they face each other.
 """)
 
 T010 = Rule("""
-    T010 warning: degenerate face
-    A face uses a vertex twice, or its three vertices lie on one line exactly. Repair programs drop it, and open the
-    mesh.
+    T010 info: degenerate face
+    A face uses a vertex twice, or its three vertices lie on one line exactly. No layer shows it. Repair programs drop
+    it, and open the mesh.
     Example: A face has the corners (0, 0, 0), (1, 0, 0) and (2, 0, 0).
     Fix: Weld and collapse short edges at export.
 """)
 
 T011 = Rule("""
-    T011 warning: sliver
+    T011 info: sliver
     A face is longer than a thousandth of its shell's diagonal but lower than the grid of float32 numbers there: its
-    direction is rounding noise, and welding turns it over.
+    direction is rounding noise, and welding turns it over. No layer shows it.
     Example: A face is 10 mm long and 0.0000001 mm high.
     Fix: Mesh with a minimum edge length, or collapse short edges.
 """)
@@ -103,7 +109,8 @@ T012 = Rule("""
 T013 = Rule("""
     T013 warning: stored normals disagree
     A facet's stored normal differs from the one of its vertices by more than 15 degrees, or is not a number. Programs
-    that trust it shade or orient the part wrongly.
+    that trust it shade or orient the part wrongly. Information if all such facets are lower than 0.2 mm, the least
+    feature of the finest printer in the catalogue.
     Example: A level facet has the stored normal (1, 0, 0).
     Fix: Write normals from the vertices, or zeros.
 """)
@@ -115,23 +122,25 @@ NORMAL_COS = float(np.cos(np.radians(15.0)))  # T013
 def check_mesh(part: Inspection) -> Iterator[Finding]:
     """Apply the topology rules but for T008, which needs to know which shell is inside which."""
     topology = part.topology
-    mesh, edges, kept = topology.mesh, topology.edges, topology.kept
+    mesh, kept = topology.mesh, topology.kept
     if topology.unused:
         yield unreferenced(topology.unused)
     yield from _open_edges(topology)
     if part.mesh.normals is not None:
-        yield from _stored_normals(part.mesh, part.mesh.normals, kept, topology.stored_areas)
+        limit = topology.resolution.feature
+        yield from _stored_normals(part.mesh, part.mesh.normals, kept, topology.stored_areas, limit)
     yield from _many_faces(topology)
     yield from _thin(topology)
     if n := len(topology.pinched):
         text = counted(n, "pinch vertex", "pinch vertices")
         yield T004.finding(text, n, (Location(xyz=point(xyz)) for xyz in mesh.vertices[topology.pinched]))
     twice = topology.twice[~without_area(mesh.vertices[mesh.faces[topology.twice]])]  # the others are T010
-    if n := len(twice):
-        yield T009.finding(counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, twice))
-    if n := len(topology.unbalanced):
-        text = f"{counted(n, 'edge')} along which more faces run one way than the other"
-        yield T007.finding(text, n, at_edges(mesh.vertices, edges, kept, topology.unbalanced))
+    n = len(twice)
+    yield from by_width(
+        part, T009, counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, twice), "warning"
+    )
+    more = " along which more faces run one way than the other"
+    yield from _with_flaps(topology, T007, "edge", topology.unbalanced, more)
 
 
 def unreferenced(n: int) -> Finding:
@@ -140,28 +149,42 @@ def unreferenced(n: int) -> Finding:
 
 
 def _open_edges(topology: Topology) -> Iterator[Finding]:
-    """Report open edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001)."""
+    """Report open edges: closed by welding (T006), cracks (T005), borders of flaps and holes (T001)."""
     opened, mesh = topology.opened, topology.mesh
     if opened is None:
         return
     if n := len(opened.shut):
-        text = f"{counted(n, 'open edge')} that welding within the tolerance closes"
-        yield T006.finding(text, n, at_edges(mesh.vertices, opened.edges, opened.kept, opened.shut))
-    if len(split := opened.left[opened.split]):
-        places = at_edges(mesh.vertices, topology.edges, topology.kept, split)
-        yield T005.finding(f"{counted(len(split), 'open edge')} with a vertex in between", len(split), places)
-    if n := len(opened.left):
-        places = at_edges(mesh.vertices, topology.edges, topology.kept, opened.left)
-        yield T001.finding(counted(n, "boundary edge"), n, places)
+        text = f"{counted(n, 'open edge')} that welding closes, {number(opened.gap, 2)} mm apart at most"
+        places = at_edges(mesh.vertices, opened.edges, opened.kept, opened.shut)
+        yield T006.finding(text, n, places, None if opened.gap > STEPS * float32_step(mesh.vertices) else "info")
+    if len(crack := opened.left[opened.crack]):
+        places = at_edges(mesh.vertices, topology.edges, topology.kept, crack)
+        text = (
+            f"{counted(len(crack), 'open edge')} of a crack {number(opened.wide, 2)} mm wide at most; slicers close it"
+        )
+        yield T005.finding(text, len(crack), places)
+    left = opened.left[~opened.crack]
+    yield from _with_flaps(topology, T001, "boundary edge", left)
+
+
+def _with_flaps(topology: Topology, rule: Rule, noun: str, which: Ints, more: str = "") -> Iterator[Finding]:
+    """Report some edges, as a warning those of patches that no printer shows."""
+    if not len(which):
+        return
+    small = small_patches(topology, which)
+    for some, severity, whose in ((~small, None, ""), (small, "warning", " of patches that no printer shows")):
+        if n := int(some.sum()):
+            places = at_edges(topology.mesh.vertices, topology.edges, topology.kept, which[some])
+            yield rule.finding(f"{counted(n, noun)}{more}{whose}", n, places, severity)
 
 
 def _many_faces(topology: Topology) -> Iterator[Finding]:
-    edges = topology.edges
-    for rule, odd, word in ((T002, 1, "odd"), (T003, 0, "even")):
-        which = np.flatnonzero((edges.size > 2) & (edges.size % 2 == odd))
-        if len(which):
-            text = f"{counted(len(which), 'edge')} with more than two faces, an {word} number"
-            yield rule.finding(text, len(which), at_edges(topology.mesh.vertices, edges, topology.kept, which))
+    size = topology.edges.size
+    odd, even = (np.flatnonzero((size > 2) & (size % 2 == rest)) for rest in (1, 0))
+    yield from _with_flaps(topology, T002, "edge", odd, " with more than two faces, an odd number")
+    if n := len(even):
+        places = at_edges(topology.mesh.vertices, topology.edges, topology.kept, even)
+        yield T003.finding(f"{counted(n, 'edge')} with more than two faces, an even number", n, places)
 
 
 def _thin(topology: Topology) -> Iterator[Finding]:
@@ -191,8 +214,8 @@ def _thin(topology: Topology) -> Iterator[Finding]:
         yield T011.finding(counted(len(thin), "sliver"), len(thin), at_faces(vertices, faces, kept, thin))
 
 
-def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> Iterator[Finding]:
-    """Apply T013.
+def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats, feature: float) -> Iterator[Finding]:
+    """Apply T013; a face that is lower than a `feature` (mm) does not show.
 
     A stored normal of zeros is none, and a face lower than a thousandth of its length has no direction.
     """
@@ -203,9 +226,12 @@ def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> I
     off = np.flatnonzero(~(dot >= NORMAL_COS * lengths * real * (1 - 1e-6)))
     if not len(off):
         return
-    corners = mesh.vertices[mesh.faces[kept[off]]]
-    sound = real[off] > 1e-3 * max_side_squared(corners)
-    wrong = off[(sound & (lengths[off] > 0)) | ~np.isfinite(lengths[off])]
-    if len(wrong):
-        text = f"{counted(len(wrong), 'stored normal')} unlike the face's own"
-        yield T013.finding(text, len(wrong), (Location(face=int(kept[i])) for i in wrong))
+    square = max_side_squared(mesh.vertices[mesh.faces[kept[off]]])
+    sound, unreadable = real[off] > 1e-3 * square, ~np.isfinite(lengths[off])
+    wrong = (sound & (lengths[off] > 0)) | unreadable
+    if not wrong.any():
+        return
+    shows = unreadable | (wrong & (real[off] >= feature * np.sqrt(square)))
+    text = f"{counted(int(wrong.sum()), 'stored normal')} unlike the face's own"
+    places = (Location(face=int(kept[i])) for i in off[wrong])
+    yield T013.finding(text, int(wrong.sum()), places, None if shows.any() else "info")

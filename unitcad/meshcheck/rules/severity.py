@@ -1,0 +1,60 @@
+"""The severity of crossings, overlaps and folds: whether a printer would show them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from unitcad.meshcheck.findings import Finding, Location, drawn_meshes, number
+from unitcad.meshcheck.geometry.disputed import Disputed
+from unitcad.meshcheck.rules.inspection import Inspection
+from unitcad.meshcheck.rules.registry import Rule
+
+
+def by_layers(part: Inspection, rule: Rule, text: str, n: int, places: Iterable[Location]) -> Iterator[Finding]:
+    """Yield a finding about `n` places whose severity is that of the space that fill rules treat differently.
+
+    None if there are no places, or if there is no such space beyond rounding.
+    """
+    if not n or not (part.disputed.thick or part.disputed.shows or part.strict):
+        return
+    severity = None if part.disputed.shows or part.strict else _small(part, part.disputed.thick)
+    yield rule.finding(f"{text}{in_layers(part.disputed)}", n, _with_layer(places, part.disputed), severity)
+
+
+def _small(part: Inspection, size: float) -> str:
+    return "warning" if size >= part.topology.resolution.digit else "info"
+
+
+def in_layers(disputed: Disputed) -> str:
+    """Say how far fill rules differ, and where."""
+    layer = disputed.layer
+    if not disputed.shows:
+        return f", {number(disputed.thick, 2)} mm deep at most"
+    if layer is None:
+        return ""
+    place = f"{'xyz'[layer.axis]} = {number(layer.height, 4)}"
+    return f"; layers differ by up to {number(disputed.area, 2)} mm2 between fill rules, worst at {place}"
+
+
+def _with_layer(places: Iterable[Location], disputed: Disputed) -> Iterator[Location]:
+    """Return the places, the first with the worst layer where findings are drawn."""
+    for i, place in enumerate(places):
+        yield replace(place, layer=disputed.layer) if i == 0 and drawn_meshes() is not None else place
+
+
+def by_width(
+    part: Inspection, rule: Rule, text: str, n: int, places: Iterable[Location], least: str | None = None
+) -> Iterator[Finding]:
+    """Yield a finding about `n` places without thickness: an error if a printer loses a wall there, `least` at least.
+
+    None if there are no places, or if they are no wider than rounding.
+    """
+    if not n:
+        return
+    sheets = part.sheets
+    if not (sheets.wide or sheets.wall or part.strict):
+        return
+    fate = "" if sheets.wall else "; slicers fill it" if sheets.gap else f", {number(sheets.wide, 2)} mm wide at most"
+    severity = None if sheets.wall or part.strict else least or _small(part, sheets.wide)
+    yield rule.finding(f"{text}{fate}", n, places, severity)
