@@ -3,6 +3,7 @@
 import copy
 import typing
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Literal
 
@@ -249,8 +250,10 @@ def test_provenance_and_range_of_a_silicone_are_written(path, value):
 
 
 def test_a_key_that_is_read_by_nothing_is_seen(monkeypatch):
-    for reader in ("figures", "preparation", "pouring"):
-        monkeypatch.setattr(f"unitcad.casting.{reader}.at_room", lambda value, room_c: value)
+    """Planted: nothing depends on the room's temperature any more, neither times nor words."""
+    planted = {"at_room": lambda value, room_c: value, "in_room": lambda *_: "", "other_rooms": lambda room_c: ""}
+    for reader, name in product(("figures", "preparation", "pouring", "procedure", "procedure_text"), planted):
+        monkeypatch.setattr(f"unitcad.casting.{reader}.{name}", planted[name], raising=False)
     _before.cache_clear()
     assert not any(_effect("whole", "casting.room_c", value) for value in (20.0, 30.0))
     _before.cache_clear()

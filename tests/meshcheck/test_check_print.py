@@ -97,7 +97,7 @@ def _folded(width):
 
 def _waves(depth, step):
     """Two slabs whose common side is a wave: the upper one reaches `depth` into the lower one at its crests."""
-    n = int(round(4 / step))
+    n = round(4 / step)
     x = np.linspace(0, 4, n + 1)
     u, v = np.meshgrid(x, x, indexing="ij")
     wave = 2 + depth / 2 * np.sin(2 * np.pi * u) * np.sin(2 * np.pi * v)
@@ -140,8 +140,8 @@ ZOO = {
     "sound": (box(), "pass"),
     "side by side": (np.concatenate([box(), box(at=(10, 0, 0))]), "warning"),
     "stacked": (STACK, "warning"),
-    "tip on a face": (np.concatenate([box(), TIP + [4, 5, 10]]), "warning"),
-    "edge on a face": (np.concatenate([box(), ROOF + [3, 5, 10]]), "warning"),
+    "tip on a face": (np.concatenate([box(), TIP + np.array([4, 5, 10])]), "warning"),
+    "edge on a face": (np.concatenate([box(), ROOF + np.array([3, 5, 10])]), "warning"),
     "overlap of 0.1 um": (overlap(1e-4), "warning"),
     "overlap of 15 um": (overlap(0.015), "warning"),
     "overlap of 30 um": (overlap(0.03), "error"),
