@@ -7,7 +7,6 @@ and the kinds of TOML files that it knows.
 from __future__ import annotations
 
 import shlex
-import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
@@ -17,6 +16,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct, field
 
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal
 from unitcad.text import with_article
 
@@ -68,7 +68,7 @@ class _Room(Struct, frozen=True, forbid_unknown_fields=True):
 def _rooms() -> list[_Room]:
     """Return the additions of the core, then those of the rooms by name."""
     paths = sorted(Path(__file__).parent.glob("*/room.toml"), key=lambda path: (path.parent.name != _CORE, path))
-    return [msgspec.convert(tomllib.loads(path.read_text("utf-8")), _Room) for path in paths]
+    return [msgspec.convert(read_toml(path), _Room) for path in paths]
 
 
 def load(reference: str) -> Any:

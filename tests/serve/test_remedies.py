@@ -4,11 +4,11 @@ import pytest
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.arrays.array_file import array_templates
+from unitcad.documents import read_toml
 from unitcad.serve.answers import answered
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Ask, Edit, Trusted
 from unitcad.serve.server import _trusted_source
-from unitcad.spec import read_toml
 from unitcad.validation import custom_templates, templates
 
 

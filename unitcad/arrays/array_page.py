@@ -19,6 +19,7 @@ from unitcad.arrays.array_file import array_of
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds, PatchPart, patch_bodies, patch_moulds, patch_parts
 from unitcad.casting.steps import duration
+from unitcad.documents import read_json, read_toml
 from unitcad.errors import UnitcadError
 from unitcad.export import glb
 from unitcad.export.raster import Surface, draw
@@ -33,7 +34,6 @@ from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_pag
 from unitcad.report.read_results import expect, read_sound, read_table
 from unitcad.shape import union
 from unitcad.shape.tree import Body
-from unitcad.spec import read_toml
 from unitcad.text import number
 
 BELOW = 14.0
@@ -135,7 +135,7 @@ class ArrayManifest(Manifest):
 
 def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
     """Write `folder`/report.html of an array and return its path. Raises UnitcadError for a damaged manifest."""
-    manifest = files.read_json(folder / "manifest.json", links=False)
+    manifest = read_json(folder / "manifest.json", links=False)
     expect(manifest, ArrayManifest, folder / "manifest.json")
     target = folder / PAGE
     files.write(target, _page(folder, manifest, warn).encode("utf-8", "replace"))

@@ -46,6 +46,7 @@ from unitcad.casting.procedure_text import files as written
 from unitcad.casting.steps import pour_warnings
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
+from unitcad.documents import read_toml
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finish, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
@@ -76,7 +77,7 @@ from unitcad.pipeline.plan import (
 )
 from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subjects import Compound
-from unitcad.spec import Spec, read_toml
+from unitcad.spec import Spec
 from unitcad.spec.raw import Format
 from unitcad.validation import Changes
 

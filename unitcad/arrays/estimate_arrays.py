@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_command import assumed_line, checks_line, to_open
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress
+from unitcad.documents import read_json
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
@@ -34,12 +34,12 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         yield from assumed_line(unit, given, array.paths_of(unit)[0])
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
-        lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))
+        lines = casting_summary(read_json(folder / "casting.json"))
         yield from (line for line in lines if line not in told)
     yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
-        yield from json.loads(crosstalk.read_bytes())["answer"][:2]
+        yield from read_json(crosstalk)["answer"][:2]
     yield from to_open(folder)
 
 

@@ -15,7 +15,6 @@ Examples
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from difflib import SequenceMatcher, get_close_matches
 from functools import cache
@@ -42,6 +41,7 @@ from unitcad.catalogue.entries import (
     kinds_of,
     required_of,
 )
+from unitcad.documents import parse_toml
 from unitcad.errors import Refusal, unknown_name
 from unitcad.text import measured, some
 
@@ -317,7 +317,7 @@ def _read_shipped(kind: type[_Entry]) -> dict[str, _Entry]:
 
 @cache
 def _raw(file: str) -> dict[str, Any]:
-    return tomllib.loads((files("unitcad.catalogue") / file).read_text("utf-8"))
+    return parse_toml((files("unitcad.catalogue") / file).read_text("utf-8"), file)
 
 
 def _plain(table: Any) -> dict[str, Any]:

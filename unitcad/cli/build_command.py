@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 import time
-import tomllib
 from collections.abc import Container, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -34,7 +32,9 @@ from unitcad.cli.shared_options import (
     with_fit,
 )
 from unitcad.designs import widths
-from unitcad.errors import UnitcadError, WrongArgument, install_step
+from unitcad.documents import read_json, read_toml
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.extras import install_step
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
@@ -44,7 +44,7 @@ from unitcad.pipeline.write import BENCH, PAGE, Built, hold_folder
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.report.read_results import check_casts
-from unitcad.spec import Spec, assumed_lengths, length_text, read_toml
+from unitcad.spec import Spec, assumed_lengths, length_text
 from unitcad.spec.custom_code import files_named
 from unitcad.text import join_words, number
 from unitcad.validation import confirm_known, every_template
@@ -87,8 +87,8 @@ def _states(specs: list[Path]) -> dict[Path, tuple[int, int, int] | None]:
 def _files_of(spec: Path) -> Iterator[Path]:
     """Yield the files that a spec or an array names; none for a text that can't be read."""
     try:
-        data = tomllib.loads(spec.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        data = read_toml(spec)
+    except UnitcadError:
         return
     named = files_named(data)
     design = named.pop("design", "")
@@ -111,14 +111,14 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
         circuit = f" with its circuit, {alone} without" if alone != high and spec.fpcb else ""
         mass = columns.get("silicone_mass_g")
         silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
-        cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
+        cells = read_json(built.folder / "casting.json")["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
         cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
         across = " x ".join(number(width, 3) for width in widths(spec, cast))
         yield f"{each}{across} mm across, {high} mm high{circuit}{silicone}"
     yield from assumed_line(spec, given)
     if manifest["casting"]:
-        yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
+        yield from casting_summary(read_json(built.folder / "casting.json"))
     yield from checks_line(manifest)
     if level := manifest["estimate"]:
         yield from level["lines"]

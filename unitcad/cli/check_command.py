@@ -19,6 +19,7 @@ from msgspec import Meta, Struct, field
 
 from unitcad import catalogue, files
 from unitcad.catalogue import Printer, printers
+from unitcad.documents import parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
 from unitcad.files import no_such_file, path_seen_from
 from unitcad.meshcheck import Limits, Options, file_checks
@@ -28,7 +29,6 @@ from unitcad.meshcheck.rules.registry import check_prefixes
 from unitcad.meshcheck.rules.registry import explain as explanation
 from unitcad.meshcheck.rules.s_scale import unit_named
 from unitcad.rooms import expect_none_but, load
-from unitcad.spec.toml import parse_toml, read_toml
 
 
 class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):

@@ -15,6 +15,7 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.catalogue import Material, MaterialEntry, choose
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
 from unitcad.lab.material import (
@@ -31,7 +32,7 @@ from unitcad.lab.material import (
 from unitcad.lab.readers import Layout
 from unitcad.lab.units import COLUMN_UNITS
 from unitcad.rooms import expect_none_but
-from unitcad.spec import convert, read_toml
+from unitcad.spec import convert
 from unitcad.text import some, toml, toml_key
 
 _SHOWN_TO = 1.2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +21,7 @@ from unitcad.catalogue import Material, Printer, choose, materials, printers, ti
 from unitcad.catalogue import entries as kinds
 from unitcad.catalogue.entries import between
 from unitcad.designs import layer_colour
+from unitcad.documents import parse_toml
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import tissue_layer
 from unitcad.kernels.mesh import bounds, realise
@@ -88,7 +88,7 @@ LOSS_FACTOR = (0.2, 0.1, 0.3)
 @cache
 def thinned() -> dict[str, Any]:
     """Return the moduli of silicones with thinner by silicone, and their `source`."""
-    return tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
+    return parse_toml((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"), "thinned.toml")
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path, PureWindowsPath
 import msgspec
 
 from unitcad import files
+from unitcad.documents import read_json
 from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.meshcheck.findings import FileReport, counted, merge
 from unitcad.meshcheck.rules.inspection import Options, Printer
@@ -58,7 +59,7 @@ def read(where: str) -> Listing:
     path = Path(where)
     path = path / "manifest.json" if path.is_dir() else path
     try:
-        manifest = msgspec.convert(files.read_json(path), _Manifest)
+        manifest = msgspec.convert(read_json(path), _Manifest)
     except UnitcadError as error:
         raise Refusal("--manifest", str(where), f"cannot be read: {error}") from error
     except msgspec.ValidationError as error:

@@ -26,9 +26,9 @@ from unitcad.casting.procedure_text import files as written
 from unitcad.catalogue import Printer
 from unitcad.checks import Strain, check_geometry, check_unit, strain_findings, strains
 from unitcad.checks.finding import FindingRecord
+from unitcad.documents import json_bytes
 from unitcad.errors import Unfinished
 from unitcad.estimate_inputs import estimate_input, estimate_spec
-from unitcad.json_text import json_bytes
 from unitcad.kernels.mesh import bounds
 from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet

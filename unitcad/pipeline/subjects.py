@@ -5,12 +5,12 @@ A room names its `Compound` in the `FileKind` of its files. Its loaded object na
 
 from __future__ import annotations
 
-import json
 from abc import abstractmethod
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
+from unitcad.documents import parse_json
 from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.make import Subject
@@ -89,5 +89,5 @@ def subject_of_data(data: Mapping[str, Any]) -> Subject:
 
 def subject_of_text(text: str) -> Subject:
     """Return the subject of `Subject.text`."""
-    data = json.loads(text)
+    data = parse_json(text, "the subject")
     return subject_of_data(data) if compound_kind(data) else Subject(from_json(text))

@@ -16,13 +16,12 @@ from typing import Any
 
 from unitcad import cache, files
 from unitcad.cache import MemoryStore, MissingContent, Store, digest
+from unitcad.documents import json_bytes, read_json, read_toml
 from unitcad.errors import UnitcadError
-from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import check_outputs, code_version
 from unitcad.pipeline.subjects import subject, subject_of_data
-from unitcad.spec import read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
 
 LOCK = re.compile(r"\.[a-z0-9.-]+-[0-9a-f]{12}\.lock")
@@ -159,7 +158,7 @@ def earlier(folder: Path, wanted: Subject) -> Earlier:
     """Return the manifest of an existing folder. Raises UnitcadError if it is no result of this spec."""
     formats = earlier_formats(folder, wanted)
     try:
-        manifest = files.read_json(folder / "manifest.json", links=False)
+        manifest = read_json(folder / "manifest.json", links=False)
         outputs = tuple(name for name in manifest["outputs"] if isinstance(name, str))
         return Earlier(formats, outputs, all(entry["reason"] != UNCHECKED for entry in manifest["skipped"]))
     except (UnitcadError, KeyError, TypeError):
@@ -173,7 +172,7 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
     link counts as absent.
     """
     try:
-        manifest = files.read_json(folder / "manifest.json", links=False)
+        manifest = read_json(folder / "manifest.json", links=False)
         if any((folder / parent).is_symlink() for parent in {Path(path).parent for path in manifest["files"]}):
             return None
         for path, listed in manifest["files"].items():

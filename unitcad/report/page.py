@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from msgspec import structs
 
 from unitcad import __version__
+from unitcad.documents import parse_toml
 from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.meshcheck.findings import counted
@@ -199,4 +199,4 @@ def page(data: dict[str, Any], title: str) -> str:
 
 def vendored() -> dict[str, dict[str, Any]]:
     """Return the libraries that every page carries, by name: version, licence, files, how they were made."""
-    return tomllib.loads(asset("vendor/versions.toml"))
+    return parse_toml(asset("vendor/versions.toml"), "versions.toml")

@@ -28,6 +28,7 @@ from msgspec import Meta, Struct, field, structs
 
 from unitcad.cache import digest
 from unitcad.catalogue.entries import between
+from unitcad.documents import parse_json
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import subject_of_data
@@ -293,7 +294,7 @@ class Sweep:
     def data(self, index: int) -> dict[str, Any]:
         """Return the plain data of variant `index`. Raises Refusal for a path that leads nowhere."""
         base, values = self.values(index)
-        data = json.loads(self._texts[base])
+        data = parse_json(self._texts[base], base)
         for path, value in values.items():
             put(data, path, value)
         swept = {path: value for path, value in values.items() if path not in self._alone}
@@ -395,10 +396,15 @@ def _values(path: str, given: Any, mode: Mode) -> Values:
             raise Refusal(f"sweep.{path}.num", values.num, "start and stop are the same value", 1)
         return values
     seen = [json.dumps(value) for value in values]
-    twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
-    if mode != "zip" and len(set(seen)) < len(seen) and len(seen) <= 10_000:
-        once = [json.loads(text) for text in dict.fromkeys(seen)]
-        raise Refusal(f"sweep.{path}", values, f'has {format_value(twice)} twice; only mode = "zip" may repeat', once)
+    counts = Counter(seen)
+    if mode != "zip" and len(counts) < len(seen) and len(seen) <= 10_000:
+        first: dict[str, Any] = {}
+        for text, value in zip(seen, values, strict=True):
+            first.setdefault(text, value)
+        twice = next(value for value, text in zip(values, seen, strict=True) if counts[text] > 1)
+        raise Refusal(
+            f"sweep.{path}", values, f'has {format_value(twice)} twice; only mode = "zip" may repeat', [*first.values()]
+        )
     return values
 
 

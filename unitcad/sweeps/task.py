@@ -15,6 +15,7 @@ from msgspec import structs
 
 from unitcad import files
 from unitcad.cache import DiskStore, default_root, digest
+from unitcad.documents import read_json
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import write as folders
 from unitcad.pipeline.make import Subject
@@ -158,7 +159,7 @@ def _finished_manifest(folder: Path, spec: Subject, task: Task, damaged: str) ->
         return None
     try:
         same = (
-            files.read_json(folder / "timings.json", links=False).get("code") == task.code
+            read_json(folder / "timings.json", links=False).get("code") == task.code
             and set(manifest["outputs"]) == set(spec.outputs(task.only))
             and set(formats) == set(spec.formats)
             and task.check != any(left["reason"] == UNCHECKED for left in manifest["skipped"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
@@ -15,7 +14,8 @@ from unitcad import catalogue
 from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import EPS, check_ribs, farthest_push, leaf_mm, least_skirt, least_slot
-from unitcad.errors import Refusal, UnknownKey
+from unitcad.documents import parse_toml
+from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
@@ -83,9 +83,9 @@ def lab_fit(text: str) -> LabFit:
     from unitcad.attenuation.edge.ranges import LabFit, fault
 
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise Refusal(FIELD, None, f"not TOML: {error}") from None
+        data = parse_toml(text, "its text")
+    except UnitcadError as error:
+        raise Refusal(FIELD, None, str(error)) from None
     if kind := kind_of(data):
         raise Refusal(FIELD, None, f"is {with_article(kind.name)}, not a fit; {_NEXT}")
     try:
