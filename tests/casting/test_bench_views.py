@@ -62,7 +62,7 @@ def test_views_name_pieces_that_there_are(source, planned):
         step.name for step in plan.steps
     }
     for name, view in views(moulds).items():
-        known = {body.name for body in (*moulds.unit, *moulds.laid_later)} if view.group == "unit" else tools
+        known = {body.name for body in (*moulds.unit, *moulds.plan.laid_later)} if view.group == "unit" else tools
         assert {part.name for part in view.parts} <= known, name
 
 

@@ -387,11 +387,11 @@ def pictures(moulds: PatchMoulds) -> dict[str, Callable[[], bytes]]:
     return {f"pictures/{name}.png": picture for name, picture in names.items()}
 
 
-def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
+def _solid(moulds: MouldSet, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
     return Surface(*arrays(moulds.mesh(body).translate(by)), body.colour)
 
 
-def take_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
+def take_apart(moulds: MouldSet) -> Iterator[tuple[Body, tuple[float, float, float]]]:
     """Yield tools and cast layers and how far each is moved (mm) to be shown apart.
 
     One over the other in the order of the pours; the pieces of a tool next to each other.
@@ -419,7 +419,7 @@ def is_moved_later(plan: Plan, step: Step) -> bool:
     return step.index < last.index and not set(step.layer) <= set(last.earlier)
 
 
-def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
+def _of_pour(moulds: MouldSet, step: Step) -> Iterator[tuple[Body, ...]]:
     """Yield the parts of one pour, from below: base and filaments, inserted layers, cup, silicone, lid."""
     plan, colours = moulds.plan, {body.step: body for body in moulds.unit}
     own = (*plan.standing(step, "base"), *plan.standing(step, "filament"))

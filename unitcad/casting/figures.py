@@ -217,7 +217,7 @@ class Batch:
     @cached_property
     def mix(self) -> Mix:
         """Weights for all cavities and channels."""
-        poured = self.volume_mm3 * len(self.step.layer) / self.moulds.pieces(self.step.name)
+        poured = self.volume_mm3 * len(self.step.layer) / self.step.solids
         return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3)
 
     @property
@@ -325,7 +325,7 @@ class Batch:
         practice = "assumed: usual practice"
         channels = " + sprue and vents" if step.channels else ""
         # An array's layers are drawn of all units together.
-        whole = len(step.layer) // self.moulds.pieces(step.name) != cells
+        whole = len(step.layer) // step.solids != cells
         what, times = ("volume of this pour", "volume") if whole else ("volume of one layer", "volume x cavities")
         taken = f"({times}{channels})" if channels or not whole else times
         more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
