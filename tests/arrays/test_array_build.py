@@ -23,7 +23,8 @@ from unitcad.casting.steps import casting_summary, duration
 from unitcad.casting.views import picture_path, views
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
-from unitcad.pipeline.make import Progress
+from unitcad.pipeline.make import make
+from unitcad.pipeline.result import Progress
 from unitcad.pipeline.write import build as build_array
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered
@@ -180,7 +181,7 @@ def test_arrays_that_differ_only_in_their_places_share_no_moulds_in_a_store():
     store, trays = MemoryStore(), []
     for pitch in (20, 22):
         array = load_array("forearm-pockets", [*SMALL, f"layout.pitch_mm={pitch}"])
-        (base, *_) = Arrayed(array).make(("moulds",), False, store, Progress()).manifest["parts"]
+        (base, *_) = make(Arrayed(array), ("moulds",), False, store, Progress()).manifest["parts"]
         trays.append(base["bbox_mm"][3] - base["bbox_mm"][0])
     assert trays[1] - trays[0] == pytest.approx(2)
 

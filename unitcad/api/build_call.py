@@ -11,22 +11,29 @@ from typing import Protocol
 
 from unitcad import text
 from unitcad.arguments import path, texts
+from unitcad.pipeline.manifest import PAGE
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.variant import Variant
-from unitcad.pipeline.write import PAGE, Built, hold_folder
+from unitcad.pipeline.write import Built, hold_folder
 from unitcad.pipeline.write import build as build_whole
 from unitcad.report import write_report
 from unitcad.spec import Spec
 from unitcad.spec.raw import OUTPUTS, Format
 from unitcad.validation import Changes, Source
+from unitcad.validation.plain_data import changes_of
 
 
 class Buildable(Protocol):
     """An object that a room loaded, such as an array of units."""
 
     @property
-    def subject(self) -> str:
-        """The class by which the pipeline builds it, as "module:name"."""
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def unit(self) -> Spec:
+        """The spec of its unit, or of the first of several."""
         ...
 
 
@@ -142,10 +149,11 @@ def build(
     (True, 181)
     """
     into, outputs = Path(path("out", out)), texts("only", only)
-    wanted = load_subject(source, set, outputs)
+    changes = dict(changes_of(set))
     if formats is not None:
-        wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
-    built = build_whole(wanted.of, into, only=outputs, check=check, say=progress or (lambda step: None))
+        changes["output.formats"] = texts("formats", formats)
+    wanted = load_subject(source, changes, outputs)
+    built = build_whole(wanted, into, only=outputs, check=check, say=progress or (lambda step: None))
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         with hold_folder(built.folder):
             write_report(built.folder)

@@ -26,9 +26,8 @@ from unitcad.kernels.mesh import arrays, bounds
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan, Step
-from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.manifest import BENCH, PAGE, Manifest
 from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
-from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_page
 from unitcad.report.read_results import expect, read_sound, read_table
 from unitcad.shape import union

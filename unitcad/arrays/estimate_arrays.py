@@ -14,11 +14,11 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.build_command import assumed_line, checks_line, to_open
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.summary import assumed_line, checks_line, to_open
 from unitcad.text import number
 from unitcad.validation import compound_kind
 

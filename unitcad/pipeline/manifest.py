@@ -1,28 +1,23 @@
-"""manifest.json: its tables, how a unit's is made, and the columns that a table of variants takes from it.
+"""manifest.json: its tables, and the columns that a table of variants takes from it. `make.py` makes it.
 
 A later version may add keys; those that are here keep their names.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
-from importlib.util import find_spec
+from collections.abc import Iterable
 from typing import Any, NotRequired, TypedDict
 
-from unitcad import __version__, catalogue
-from unitcad.attenuation.edge.estimates import summary
+from unitcad import catalogue
 from unitcad.checks.finding import FindingRecord
-from unitcad.designs import design_of, no_estimate
-from unitcad.designs.design import Reason
-from unitcad.moulds.mould_set import MouldSet, shallow_grooves
-from unitcad.pipeline.plan import kernel_versions
-from unitcad.spec import Spec, spec_hash
-from unitcad.spec.raw import OUTPUTS
-from unitcad.validation import warnings
+from unitcad.spec import Spec
 
 CASTING = ("bom.csv", "casting.json", "casting.md", "troubleshooting.md")
+DRAWING = "drawing.pdf"
+PAGE = "report.html"
+"""The page of a folder, made on request and kept up by every later build into it."""
+BENCH = "bench.html"
+"""The bench page of a variant's procedure, next to the page."""
 UNCHECKED = "--no-check"
-NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
 NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
@@ -115,7 +110,7 @@ class FileRecord(TypedDict):
 
 
 class Manifest(TypedDict):
-    """A variant's manifest; `mould_checks` are the findings of the mould checks."""
+    """A result's manifest; `mould_checks` are the findings of the mould checks. A room's may have further keys."""
 
     name: str
     design: str
@@ -161,81 +156,6 @@ class Geometry(TypedDict):
     check: list[MeshFinding]
     files: dict[str, str]
     skipped: list[Skipped]
-
-
-def of_unit(
-    moulds: MouldSet,
-    only: Sequence[str],
-    check: bool,
-    shape: Geometry,
-    findings: list[FindingRecord],
-    estimate: dict[str, Any] | None,
-    pictures: list[str],
-) -> Manifest:
-    """Return a unit's manifest but for its files."""
-    spec = moulds.spec
-    return Manifest(
-        name=spec.name,
-        design=spec.design,
-        printer=spec.moulds.printer,
-        hash=spec_hash(spec)[:12],
-        outputs=list(only),
-        label=shape["label"],
-        warnings=[*warnings(spec), *(shallow_grooves(moulds) if "moulds" in only else [])],
-        air_ring_mm=shape["air_ring_mm"],
-        compensation={
-            "shrinkage_percent": spec.moulds.shrinkage_percent,
-            "bore_compensation_mm": spec.moulds.bore_compensation_mm,
-        },
-        mesh={
-            "kernel": "manifold3d",
-            "tolerance_mm": spec.output.tolerance_mm,
-            "segments": moulds.segments,
-            "note": "volume_mm3 and bbox_mm are the mesh's: its corners may exceed the surface by the tolerance",
-        },
-        parts=[
-            {
-                **part,
-                "material": spec.layers[(part["step"] or 0) - 1].material if part["made"] == "cast" else None,
-            }
-            for part in shape["parts"]
-        ],
-        steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
-        mould_checks=findings,
-        estimate=EstimateSummary(**summary(estimate)) if estimate else None,
-        check=count_findings(shape["check"]),
-        pictures=pictures,
-        casting=sorted(CASTING) if "casting" in only else None,
-        skipped=[Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)],
-        versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},
-        files={},
-    )
-
-
-def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
-    """Name the outputs that this variant lacks, and why."""
-    if not check or "moulds" not in only:
-        yield "mould checks", NO_MOULDS if check else UNCHECKED
-    if not check:
-        yield "mesh checks", UNCHECKED
-    design = design_of(spec)
-    if design.tooling == "concentric":
-        if len(spec.layers) == 1:
-            yield "second pour", "one layer: one pour"
-        if not spec.fpcb and not spec.wires:
-            yield "tongue and slot", "no FPCB"
-    yield from design.skipped(spec)
-    for name in OUTPUTS:
-        if name not in only:
-            # The page offers the command for outputs that were not asked for (report/app/estimate.js).
-            yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
-    if "step" not in spec.output.formats:
-        yield "boundary representation", "no STEP asked for" if _has_step_kernel() else NO_KERNEL
-
-
-@cache
-def _has_step_kernel() -> bool:
-    return find_spec("OCP") is not None
 
 
 def printed_mm3(parts: Iterable[PartRecord]) -> float:

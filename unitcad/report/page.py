@@ -14,14 +14,14 @@ from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.manifest import BENCH, PAGE
 from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
-from unitcad.pipeline.write import BENCH, PAGE
+from unitcad.pipeline.subjects import compound
 from unitcad.report import read_results
 from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import Pool, asset, compress, html_page
 from unitcad.report.read_results import VariantRecord
-from unitcad.rooms import load
 from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
@@ -76,7 +76,7 @@ def write_report(
             if unit.is_dir() and not unit.is_symlink() and read_results.is_variant(unit):
                 write_report(unit, warn)
         _write_bench(folder, warn)
-        return load(kind.subject).write_page(folder, warn)
+        return compound(kind).write_page(folder, warn)
     if folder.is_dir() and read_results.is_variant(folder):
         _write_bench(folder, warn)
     data, title, damage = page_data(folder, modelled)

@@ -21,9 +21,8 @@ from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.files import TEMPORARY
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.manifest import PAGE, Manifest
 from unitcad.pipeline.plan import GEOMETRIC, build_key
-from unitcad.pipeline.write import PAGE
 from unitcad.report.html_page import REFERENCE
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, read_toml, to_data, with_formats

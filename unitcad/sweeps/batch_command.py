@@ -29,7 +29,7 @@ from unitcad.cli.shared_options import (
 )
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
-from unitcad.pipeline.write import PAGE
+from unitcad.pipeline.manifest import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.batch_call import make, place, preview

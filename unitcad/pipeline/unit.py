@@ -1,0 +1,163 @@
+"""A unit's result: its files, findings, estimate and casting procedure."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, ClassVar
+
+from unitcad.attenuation.edge.estimates import rounded_layered
+from unitcad.attenuation.edge.estimates import summary as estimate_summary
+from unitcad.attenuation.inputs import EstimateInput
+from unitcad.cache import Store, digest
+from unitcad.casting.figures import check_castable
+from unitcad.casting.procedure import procedure
+from unitcad.designs import design_of, no_estimate
+from unitcad.designs.design import Reason
+from unitcad.estimate_inputs import estimate_input, estimate_spec
+from unitcad.json_text import json_bytes
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
+from unitcad.pipeline.geometry import filed, geometric_result
+from unitcad.pipeline.manifest import DRAWING, NO_KERNEL, UNCHECKED, EstimateSummary, Manifest, Skipped
+from unitcad.pipeline.optional import OptionalFiles
+from unitcad.pipeline.plan import build_key, code_version, plan, possible_outputs
+from unitcad.pipeline.plan import forget as forget_geometry
+from unitcad.pipeline.result import Progress, Result
+from unitcad.pipeline.scenes import drawing
+from unitcad.pipeline.subject import Subject
+from unitcad.pipeline.summary import unit_summary
+from unitcad.spec import Spec, spec_hash, to_json, to_toml, with_formats
+from unitcad.spec.raw import OUTPUTS, Format
+from unitcad.validation import warnings
+
+
+class Unit(Subject):
+    """A spec, as a result is made of it."""
+
+    kind: ClassVar[str] = "spec"
+    file: ClassVar[str] = "spec.toml"
+
+    def __init__(self, spec: Spec, given: frozenset[str] = frozenset()) -> None:
+        self.unit, self.name, self.hash, self.given = spec, spec.name, spec_hash(spec), given
+        self.formats = spec.output.formats
+
+    @property
+    def moulds(self) -> MouldSet:
+        return MouldSet(self.unit, self.given)
+
+    @property
+    def text(self) -> str:
+        return to_json(self.unit)
+
+    def toml(self) -> str:
+        return to_toml(self.unit)
+
+    def key(self, only: Sequence[str], check: bool) -> str:
+        return build_key(self.moulds, only, check)
+
+    def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
+        return possible_outputs(self.unit, only)
+
+    def with_formats(self, formats: Sequence[Format]) -> Unit:
+        return Unit(with_formats(self.unit, tuple(formats)), self.given)
+
+    def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
+        return unit_summary(self.unit, folder, manifest, self.given)
+
+    def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Result:
+        spec, moulds, made = self.unit, self.moulds, Result()
+        if {"moulds", "casting"} & set(only):
+            check_castable(moulds)  # refuses before the long work begins
+        optional = OptionalFiles(made.skipped)
+        if "pdf" in self.formats and {"unit", "moulds"} & set(only):  # its names are the spec's own
+            progress("drawing")
+            if drawn := optional.made(DRAWING, lambda: drawing(moulds, only)):
+                made.own[DRAWING] = drawn
+        if "estimate" in only:  # first: the helper for STEP loads its kernel in the meantime
+            progress("estimate")
+            estimate, made.own["estimate.json"] = _estimate(spec, store)
+            made.estimate = EstimateSummary(**estimate_summary(estimate))
+        shape = geometric_result(moulds, only, check, store, progress)
+        made.add(shape)
+        made.label, made.air_ring_mm = shape.label, shape.air_ring_mm
+        pictures = _shaded_pictures(moulds, only, store, progress, optional)
+        made.shared |= pictures
+        made.pictures = list(pictures)
+        if "casting" in only:
+            progress("casting")
+            made.cast(procedure(moulds, made.volumes_mm3, made.printed_mm3))
+        made.warnings = [*warnings(spec), *(shallow_grooves(moulds) if "moulds" in only else [])]
+        lacking = [Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)]
+        made.skipped = [*lacking, *made.skipped]
+        made.compensation = {
+            "shrinkage_percent": spec.moulds.shrinkage_percent,
+            "bore_compensation_mm": spec.moulds.bore_compensation_mm,
+        }
+        return made
+
+
+def _shaded_pictures(
+    moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress, optional: OptionalFiles
+) -> dict[str, str]:
+    """Return the pictures that the format png asks for, path to SHA-256."""
+    if "png" not in moulds.spec.output.formats:
+        return {}
+    progress("pictures")
+    scenes = [planned for planned in plan(moulds.blank, only, ("png",)) if planned.form == "png"]
+    made = {planned.path: optional.made(planned.path, partial(filed, store, planned)) for planned in scenes}
+    return {path: sha256 for path, sha256 in made.items() if sha256}
+
+
+NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
+
+
+def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
+    """Name the outputs that this variant lacks, and why."""
+    if not check or "moulds" not in only:
+        yield "mould checks", NO_MOULDS if check else UNCHECKED
+    if not check:
+        yield "mesh checks", UNCHECKED
+    design = design_of(spec)
+    if design.tooling == "concentric":
+        if len(spec.layers) == 1:
+            yield "second pour", "one layer: one pour"
+        if not spec.fpcb and not spec.wires:
+            yield "tongue and slot", "no FPCB"
+    yield from design.skipped(spec)
+    for name in OUTPUTS:
+        if name not in only:
+            # The page offers the command for outputs that were not asked for (report/app/estimate.js).
+            yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
+    if "step" not in spec.output.formats:
+        yield "boundary representation", "no STEP asked for" if find_spec("OCP") else NO_KERNEL
+
+
+_ESTIMATES: dict[Hashable, tuple[dict[str, Any], bytes]] = {}
+"""Estimates that this process made last, by their inputs: variants that differ only in casting share one."""
+_MOST_ESTIMATES = 64
+
+
+def forget() -> None:
+    """Drop the results that this process caches, for a measurement of times."""
+    forget_geometry()
+    _ESTIMATES.clear()
+
+
+def _estimate(spec: Spec, store: Store) -> tuple[dict[str, Any], bytes]:
+    """Return the estimate and its file. The layered solver's part reads no silicone: the store shares it."""
+
+    def layered(wanted: EstimateInput) -> dict[str, Any]:
+        skin = wanted.tissue_name, wanted.tissue, wanted.frequency
+        load = wanted.diameter, wanted.motor_diameter, wanted.drive
+        key = digest(repr(((*skin, *load), code_version())).encode())
+        return store.data(key, lambda: rounded_layered(wanted))
+
+    reads = estimate_input(spec), spec.estimate
+    if reads not in _ESTIMATES:
+        while len(_ESTIMATES) >= _MOST_ESTIMATES:
+            del _ESTIMATES[next(iter(_ESTIMATES))]
+        data = estimate_spec(spec, layered=layered)
+        _ESTIMATES[reads] = data, json_bytes(data)
+    return _ESTIMATES[reads]
