@@ -283,7 +283,7 @@ def test_arguments_that_can_not_be_are_refused(tmp_path):
         unitcad.estimate("encapsulating", frequency_hz=9000)
     with pytest.raises(Refusal, match=r"estimate\.models\.0 = 'own': unknown name"):
         unitcad.estimate("encapsulating", models=["own"])  # type: ignore[list-item]
-    with pytest.raises(Refusal, match=r"output\.formats\.0 = 'stp': unknown name"):
+    with pytest.raises(Refusal, match=r"formats = 'stp': unknown name"):
         unitcad.build("encapsulating", tmp_path, formats=["stp"])  # type: ignore[list-item]
     assert list(tmp_path.iterdir()) == []
 

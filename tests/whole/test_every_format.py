@@ -72,7 +72,7 @@ def test_meshes_assemblies_and_drawings_of_every_spec(name):
 @pytest.mark.parametrize("name", every_spec())
 def test_every_format_of_every_spec_is_made(name, tmp_path):
     pytest.importorskip("OCP")
-    done = build(subject_of(name, **{"output.formats": list(FORMATS)}).of, tmp_path, check=False)
+    done = build(subject_of(name, **{"output.formats": list(FORMATS)}), tmp_path, check=False)
     assert [each for each in done.manifest["skipped"] if each["reason"].startswith(optional.UNMADE)] == []
     assert (done.folder / "drawing.pdf").stat().st_size > 1000
     made = {path.suffix for path in done.folder.rglob("*") if path.is_file()}

@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from unitcad.api.build_call import build_each
 from unitcad.cli.output import print_json, progress, say_error, warn
 from unitcad.cli.shared_options import (
     AllowCode,
@@ -27,22 +28,15 @@ from unitcad.cli.shared_options import (
     expect_commas,
     names_in,
     outputs,
-    overrides,
-    with_fit,
 )
 from unitcad.errors import UnitcadError, WrongArgument, install_step
 from unitcad.pipeline import step_helper
-from unitcad.pipeline.manifest import NO_KERNEL, PAGE, Manifest
+from unitcad.pipeline.manifest import NO_KERNEL, Manifest
 from unitcad.pipeline.optional import UNMADE
-from unitcad.pipeline.subjects import load_subject
-from unitcad.pipeline.write import Built, hold_folder
-from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.report.read_results import check_casts
-from unitcad.spec import read_toml
 from unitcad.spec.custom_code import files_named
-from unitcad.validation import confirm_known, every_template
-from unitcad.validation.suggestions import numbers
+from unitcad.validation import confirm_known
 
 EVERY_S = 0.25
 """Seconds between two looks at the files."""
@@ -120,31 +114,30 @@ def build(
     if drawn and (formats is None or "step" in names_in(formats)):
         step_helper.start()  # first: it loads its modules while this process loads its own
     paged = only is None if page is None else page
-    changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
     allow_code(code)
 
     def once() -> bool:
         """Build the specs and print the results; return whether every check passed."""
-        # Every spec is validated before the first one is built.
-        wanted = [load_subject(spec, changes, chosen) for spec in specs]
-        results: list[Built] = []
-        for source, spec in zip(specs, wanted, strict=True):
-            spec.given = _given_paths(source, changes)
-            with progress(spec.name) as say:
-                result = build_subject(spec, out, only=chosen, check=not no_check, say=say)
-                if paged or (result.folder / PAGE).is_file():
-                    say("page")
-                    with hold_folder(result.folder):
-                        write_report(result.folder, warn)
-            results.append(result)
+        results = build_each(
+            specs,
+            out,
+            set=sets or (),
+            formats=None if formats is None else names_in(formats),
+            only=outputs(only),
+            check=not no_check,
+            report=paged,
+            fit=fit,
+            shown=progress,
+            warn=warn,
+        )
         if as_json:
             print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
         else:
-            for spec, result in zip(wanted, results, strict=True):
+            for result in results:
                 _print_faults(result.manifest)
                 # Standard output has the folder alone, for a script to take.
-                for line in spec.summary(result.folder, result.manifest):
-                    warn(f"{spec.name}: {line}")
+                for line in result.lines:
+                    warn(f"{result.manifest['name']}: {line}")
                 typer.echo(str(result.folder))
         return all(result.ok for result in results)
 
@@ -163,13 +156,6 @@ def build(
             except UnitcadError as error:
                 say_error(error, "object" if as_json else "text")
             warn("waiting for a save; Ctrl-C ends")
-
-
-def _given_paths(source: str, changes: list[str]) -> frozenset[str]:
-    """Return the paths of the numbers that a person gave, by --set or in a file that is no template and no result's."""
-    shipped = source in every_template() or (Path(source).parent / "manifest.json").exists()
-    own = {} if shipped else read_toml(Path(source))
-    return frozenset({change.partition("=")[0].strip() for change in changes} | {path for path, _ in numbers(own)})
 
 
 def _print_faults(manifest: Manifest) -> None:

@@ -13,10 +13,12 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.subject import Compound, Subject
 from unitcad.pipeline.unit import Unit
 from unitcad.rooms import FileKind, file_kinds, load
-from unitcad.spec import Spec, from_json
-from unitcad.validation import compound_kind, from_data
+from unitcad.spec import Spec, from_json, read_toml
+from unitcad.validation import compound_kind, every_template, from_data
 from unitcad.validation import load as load_spec
-from unitcad.validation.plain_data import Changes, Source
+from unitcad.validation.load import spell_path
+from unitcad.validation.plain_data import Changes, Source, changes_of
+from unitcad.validation.suggestions import numbers
 
 
 def compound(kind: FileKind) -> type[Compound]:
@@ -51,9 +53,25 @@ def load_subject(source: Source | Any, changes: Changes = (), only: Sequence[str
     """
     kind = compound_kind(source)
     if found := compound(kind) if kind else _made_of(source):
-        return found.load(source, changes)
-    moulded = {"moulds", "casting"} & set(only)
-    return Unit(load_spec(source, changes, makeable=(lambda spec: MouldSet(spec).plan) if moulded else None))
+        made: Subject = found.load(source, changes)
+    else:
+        moulded = {"moulds", "casting"} & set(only)
+        made = Unit(load_spec(source, changes, makeable=(lambda spec: MouldSet(spec).plan) if moulded else None))
+    made.given = _given(source, changes)
+    return made
+
+
+def _given(source: object, changes: Changes) -> frozenset[str]:
+    """Return the paths of the numbers that a person gave, by a change or in data or a file of their own.
+
+    Templates and the files of results do not count.
+    """
+    own: Mapping[str, Any] = source if isinstance(source, Mapping) else {}
+    if isinstance(source, str | os.PathLike):
+        text = spell_path(os.fspath(source), every_template())
+        shipped = text in every_template() or (Path(text).parent / "manifest.json").exists()
+        own = {} if shipped else read_toml(Path(text))
+    return frozenset({*changes_of(changes), *(path for path, _ in numbers(own))})
 
 
 def subject_of_data(data: Mapping[str, Any]) -> Subject:
