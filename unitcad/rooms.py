@@ -9,13 +9,11 @@ from __future__ import annotations
 import shlex
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-import msgspec
-from msgspec import Struct, field
 
 from unitcad.errors import Refusal
 from unitcad.text import with_article
@@ -24,7 +22,8 @@ _CORE = "cli"
 """The package whose additions come first."""
 
 
-class Command(Struct, frozen=True, forbid_unknown_fields=True):
+@dataclass(frozen=True)
+class Command:
     """A command of the command line, with its line in `unitcad --help`."""
 
     run: str
@@ -35,7 +34,8 @@ class Command(Struct, frozen=True, forbid_unknown_fields=True):
     """Command lines at the end of its help."""
 
 
-class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
+@dataclass(frozen=True)
+class FileKind:
     """A kind of TOML file: `unitcad list PLURAL`, `unitcad schema NAME`, and a start for `unitcad init`."""
 
     name: str
@@ -59,16 +59,15 @@ class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
     """The module with the file's part of the live page, if it has one."""
 
 
-class _Room(Struct, frozen=True, forbid_unknown_fields=True):
-    commands: dict[str, Command] = field(default_factory=dict)
-    files: tuple[FileKind, ...] = ()
-
-
 @cache
-def _rooms() -> list[_Room]:
+def _rooms() -> list[dict[str, Any]]:
     """Return the additions of the core, then those of the rooms by name."""
     paths = sorted(Path(__file__).parent.glob("*/room.toml"), key=lambda path: (path.parent.name != _CORE, path))
-    return [msgspec.convert(tomllib.loads(path.read_text("utf-8")), _Room) for path in paths]
+    return [tomllib.loads(path.read_text("utf-8")) for path in paths]
+
+
+def _with_tuples(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def load(reference: str) -> Any:
@@ -77,14 +76,17 @@ def load(reference: str) -> Any:
     return getattr(import_module(module), name)
 
 
+@cache
 def commands() -> dict[str, Command]:
     """Return the commands of the command line by name."""
-    return {name: command for room in _rooms() for name, command in room.commands.items()}
+    every = (pair for room in _rooms() for pair in room.get("commands", {}).items())
+    return {name: Command(**_with_tuples(table)) for name, table in every}
 
 
+@cache
 def file_kinds() -> tuple[FileKind, ...]:
     """Return the kinds of TOML files."""
-    return tuple(kind for room in _rooms() for kind in room.files)
+    return tuple(FileKind(**_with_tuples(table)) for room in _rooms() for table in room.get("files", ()))
 
 
 def kind_of(data: Mapping[str, object]) -> FileKind | None:

@@ -14,7 +14,8 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.output import console, print_indented, print_json, print_table, progress
+from unitcad.cli.output import print_json, progress
+from unitcad.cli.tables import console, print_indented, print_table
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest

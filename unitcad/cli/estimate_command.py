@@ -9,8 +9,9 @@ from rich.text import Text
 
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.catalogue import FREQUENCIES_HZ
-from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, finite, with_fit
+from unitcad.cli.tables import console, print_indented, print_table
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, estimate_spec

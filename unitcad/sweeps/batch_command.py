@@ -13,7 +13,7 @@ import typer
 from msgspec import to_builtins
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from unitcad.cli.output import console, print_json, print_json_line, progress, stage_lines, warn
+from unitcad.cli.output import print_json, print_json_line, progress, stage_lines, warn
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
@@ -27,6 +27,7 @@ from unitcad.cli.shared_options import (
     outputs,
     overrides,
 )
+from unitcad.cli.tables import console
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import PAGE
