@@ -16,7 +16,7 @@ import trimesh
 from tests.in_process import unitcad as run
 from tests.sample_bodies import LEADLESS
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import unit as artifacts
+from unitcad.pipeline import unit_estimate as artifacts
 from unitcad.pipeline.write import build, replacing, subject
 from unitcad.validation import load, templates
 

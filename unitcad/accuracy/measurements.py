@@ -24,7 +24,7 @@ from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.result import Progress
 from unitcad.pipeline.subject import Subject
-from unitcad.pipeline.unit import forget
+from unitcad.pipeline.unit_estimate import forget
 from unitcad.shape import Shape
 from unitcad.spec.raw import OUTPUTS
 

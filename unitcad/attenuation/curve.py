@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
-from scipy import special
 
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium, Response, components
 from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.lean_scipy import special
 
 EDGE_TO_MM = 30
 NO_RATIO = "the half-space contains no rings of silicone, so its curve does not depend on the layers"

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from unitcad.attenuation.edge.estimates import rounded_layered
-from unitcad.attenuation.edge.estimates import summary as estimate_summary
-from unitcad.attenuation.inputs import EstimateInput
-from unitcad.cache import Store, digest
+from unitcad.cache import Store
 from unitcad.casting.figures import check_castable
 from unitcad.casting.procedure import procedure
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
-from unitcad.estimate_inputs import estimate_input, estimate_spec
-from unitcad.json_text import json_bytes
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.geometry import filed, geometric_result
-from unitcad.pipeline.manifest import DRAWING, NO_KERNEL, UNCHECKED, EstimateSummary, Manifest, Skipped
+from unitcad.pipeline.manifest import DRAWING, NO_KERNEL, UNCHECKED, Manifest, Skipped
 from unitcad.pipeline.optional import OptionalFiles
-from unitcad.pipeline.plan import build_key, code_version, plan, possible_outputs
-from unitcad.pipeline.plan import forget as forget_geometry
+from unitcad.pipeline.plan import build_key, plan, possible_outputs
 from unitcad.pipeline.result import Progress, Result
 from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subject import Subject
@@ -76,9 +70,10 @@ class Unit(Subject):
             if drawn := optional.made(DRAWING, lambda: drawing(moulds, only)):
                 made.own[DRAWING] = drawn
         if "estimate" in only:  # first: the helper for STEP loads its kernel in the meantime
+            from unitcad.pipeline.unit_estimate import estimated  # loads scipy
+
             progress("estimate")
-            estimate, made.own["estimate.json"] = _estimate(spec, store)
-            made.estimate = EstimateSummary(**estimate_summary(estimate))
+            made.estimate, made.own["estimate.json"] = estimated(spec, store)
         shape = geometric_result(moulds, only, check, store, progress)
         made.add(shape)
         made.label, made.air_ring_mm = shape.label, shape.air_ring_mm
@@ -132,32 +127,3 @@ def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
             yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
     if "step" not in spec.output.formats:
         yield "boundary representation", "no STEP asked for" if find_spec("OCP") else NO_KERNEL
-
-
-_ESTIMATES: dict[Hashable, tuple[dict[str, Any], bytes]] = {}
-"""Estimates that this process made last, by their inputs: variants that differ only in casting share one."""
-_MOST_ESTIMATES = 64
-
-
-def forget() -> None:
-    """Drop the results that this process caches, for a measurement of times."""
-    forget_geometry()
-    _ESTIMATES.clear()
-
-
-def _estimate(spec: Spec, store: Store) -> tuple[dict[str, Any], bytes]:
-    """Return the estimate and its file. The layered solver's part reads no silicone: the store shares it."""
-
-    def layered(wanted: EstimateInput) -> dict[str, Any]:
-        skin = wanted.tissue_name, wanted.tissue, wanted.frequency
-        load = wanted.diameter, wanted.motor_diameter, wanted.drive
-        key = digest(repr(((*skin, *load), code_version())).encode())
-        return store.data(key, lambda: rounded_layered(wanted))
-
-    reads = estimate_input(spec), spec.estimate
-    if reads not in _ESTIMATES:
-        while len(_ESTIMATES) >= _MOST_ESTIMATES:
-            del _ESTIMATES[next(iter(_ESTIMATES))]
-        data = estimate_spec(spec, layered=layered)
-        _ESTIMATES[reads] = data, json_bytes(data)
-    return _ESTIMATES[reads]

@@ -29,6 +29,8 @@ class Variant(MouldSet):
         The spec; ``Variant.of`` takes a template's name or a file.
     given : frozenset of str, optional
         Paths of the lengths that a person gave, such as "motor.thickness_mm"; the procedure asks to measure the others.
+    origin : Origin, optional
+        What rooms cast in place of a unit, such as the sheet of an array. Default: the unit of the spec.
 
     Attributes
     ----------

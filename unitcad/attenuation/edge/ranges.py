@@ -20,7 +20,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
-from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.closed_form import Units, borders
 from unitcad.attenuation.edge.measured import (
@@ -48,6 +47,7 @@ from unitcad.attenuation.edge.models import (
 )
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue.entries import between
+from unitcad.lean_scipy import special
 from unitcad.text import some
 
 Positive = Annotated[float, between(1e-9, 1e9)]
@@ -166,7 +166,7 @@ def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, fl
 
 def quantiles(df: int, centre: float, scale: float) -> tuple[float, ...]:
     """Return the levels at `PERCENT` of a predictive of ln level."""
-    return tuple(float(np.exp(centre + scale * stdtrit(df, percent / 100))) for percent in PERCENT)
+    return tuple(float(np.exp(centre + scale * special.stdtrit(df, percent / 100))) for percent in PERCENT)
 
 
 def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: str) -> dict[str, Any]:
@@ -260,12 +260,12 @@ class Predictive:
     def at_most(self, level: float | np.ndarray) -> np.ndarray:
         """Return the probability that the level (motor = 1) is at most `level`, shape (...)."""
         away = np.log(np.asarray(level, dtype=float)) - self.centre
-        return stdtr(self.degrees_of_freedom, away / np.where(away < 0, self.below, self.above))
+        return special.stdtr(self.degrees_of_freedom, away / np.where(away < 0, self.below, self.above))
 
     def quantile(self, share: float) -> np.ndarray:
         """Return the level that a share of the distribution lies below, shape (...)."""
         scale = self.below if share < 0.5 else self.above
-        return np.exp(self.centre + scale * stdtrit(self.degrees_of_freedom, share))
+        return np.exp(self.centre + scale * special.stdtrit(self.degrees_of_freedom, share))
 
     @property
     def range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -334,7 +334,7 @@ class Lead:
             return either, either
         soft = np.maximum(counts, 0.0)
         effect = effect * np.minimum(1.0, np.minimum(soft, 1.0 - soft) / _EDGE)
-        end = stdtrit(self.degrees_of_freedom, PERCENT[1] / 100)
+        end = special.stdtrit(self.degrees_of_freedom, PERCENT[1] / 100)
         down, up = (np.sum((effect * far / end) ** 2, axis=-1) for far in (1.0 - soft, soft))
         return either + down, either + up
 
