@@ -53,8 +53,10 @@ class FileKind:
     """Whether `unitcad init` writes one."""
     keys: tuple[str, ...] = ()
     """The top-level keys by which a file is known to be of this kind."""
+    estimate: str = ""
+    """"module:name" of the function that prints the file's estimate, if it is not a unit's."""
     subject: str = ""
-    """"module:name" of the `pipeline.subjects.Compound` that the file describes, if it describes one."""
+    """"module:name" of the `pipeline.subject.Compound` that the file describes, if it describes one."""
     page: str = ""
     """The module with the file's part of the live page, if it has one."""
 

@@ -33,7 +33,7 @@ from unitcad.arrays.array_page import ARRAY_FILE, patch_glb, pictures, write_arr
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.circuit import crowded_tracks
 from unitcad.arrays.crosstalk import extras
-from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
+from unitcad.arrays.estimate_arrays import array_summary
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
@@ -102,7 +102,6 @@ class Arrayed(Compound):
 
     offered = staticmethod(suggest_for_array)
     write_page = staticmethod(write_array_page)
-    estimate = staticmethod(estimate_arrays)
 
     def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
         return array_summary(self.array, folder, manifest, self.given)

@@ -16,7 +16,7 @@ from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, estimate_spec
 from unitcad.moulds.plan import plan
-from unitcad.pipeline.subjects import compound
+from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
 from unitcad.text import join_words, number
 from unitcad.validation import compound_kind, confirm_known, load
@@ -298,7 +298,7 @@ def estimate(
     if kinds:
         if model:
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
-        return compound(kinds[0]).estimate(specs, with_fit(sets, fit), frequency, details, as_json)
+        return load_named(kinds[0].estimate)(specs, with_fit(sets, fit), frequency, details, as_json)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)

@@ -118,8 +118,3 @@ class Compound(Subject):
     @abstractmethod
     def write_page(folder: Path, warn: Callable[[str], None]) -> Path:
         """Write the page of a result's folder. Returns its path."""
-
-    @staticmethod
-    @abstractmethod
-    def estimate(names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool) -> None:
-        """Print the estimate of one or several. `hertz`: the drive's frequency; None: the motor's. Raises Refusal."""
