@@ -86,6 +86,7 @@ def test_attenuation_and_check_know_nothing_of_cad():
                 "files",
                 "geometry",
                 "text",
+                "json_text",
                 "errors",
             )
             assert below in known, f"{file} imports {below}"

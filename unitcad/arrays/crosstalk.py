@@ -19,13 +19,12 @@ from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_
 from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.attenuation.curve import RANGE, contact, decay, ends
 from unitcad.errors import Refusal
-from unitcad.estimate_inputs import estimate_input, estimate_spec
+from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.export.chart import coord
 from unitcad.shape import Profile
 from unitcad.text import join_words, number
 
 _SUMS = ("sum", "root_sum_of_squares")
-_ENDS = {"low": "p10", "high": "p90"}
 DIGITS = 6
 ASSUMPTIONS = [
     "The decay is that of the bare, laterally uniform skin under each unit's own motor; the other units, the sheet and "
@@ -194,10 +193,10 @@ def _absolute(
 
     The 80 % ranges of the units' levels at the edge, all at one end, times the decay at the same end of its range.
     """
-    answers = [estimate_spec(unit, (), layered=lambda variant: {})["answer"] for unit in units.array.units]
-    if any(one["p10"] is None for one in answers):
+    answers = [answer_spec(unit) for unit in units.array.units]
+    if any(one.low is None for one in answers):
         return {"reason": "the level of a unit is not known"}
-    levels = {end: np.array([one[point] for one in answers])[units.kind] for end, point in _ENDS.items()}
+    levels = {end: np.array([getattr(one, end) for one in answers])[units.kind] for end in ("low", "high")}
     at_ends = {end: _sums(matrix * level[:, None]) for end, level in levels.items()}
     return {
         name: {

@@ -121,7 +121,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
         yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
     yield from checks_line(manifest)
     if level := manifest["estimate"]:
-        yield from level["lines"]
+        yield level["line"]
     yield from to_open(built.folder)
 
 

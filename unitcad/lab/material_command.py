@@ -11,12 +11,12 @@ import numpy as np
 import typer
 
 from unitcad import catalogue, files
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.catalogue import Material, MaterialEntry, choose
 from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
 from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
+from unitcad.json_text import rounded
 from unitcad.lab.material import (
     DynamicResult,
     Specimen,

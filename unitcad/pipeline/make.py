@@ -54,7 +54,6 @@ from unitcad.pipeline.plan import (
     groups,
     is_printed,
     plan,
-    possible_outputs,
     ready,
 )
 from unitcad.pipeline.plan import forget as forget_geometry
@@ -142,7 +141,7 @@ class Subject:
 
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
         """Return the outputs of `only` that this subject has."""
-        return possible_outputs(self.of, only)
+        return tuple(only)
 
     def with_formats(self, formats: Sequence[Format]) -> Subject:
         """Return the same subject with other formats."""
@@ -153,7 +152,7 @@ class Subject:
 
         Raises Refusal if the moulds can't be made, Unfinished if a check lacks memory or time.
         """
-        spec, outputs = self.unit, possible_outputs(self.unit, only)
+        spec, outputs = self.unit, tuple(only)
         moulds = MouldSet(spec, given=self.given)
         if {"moulds", "casting"} & set(outputs):
             check_castable(moulds)  # refuses before the long work begins
