@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from msgspec import structs
 from scipy import integrate, stats
 
-from unitcad.attenuation.edge.contrast import Place, counts, method_spread, place_of, unit_of_scale
+from unitcad.attenuation.edge.contrast import Place, counts, place_of, unit_of_scale
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.catalogue import Value, materials
+from unitcad.catalogue.moduli import method_spread
 from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.validation import from_data, load, read
 

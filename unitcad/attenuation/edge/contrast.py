@@ -14,7 +14,7 @@ is that silicone. Beyond them its place moves by the logarithm, and its doubt gr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -23,10 +23,10 @@ import numpy as np
 from scipy.special import ndtr
 
 from unitcad.catalogue import Material, Value, materials, measurements
+from unitcad.catalogue.moduli import PAPER, method_spread, readings
 
 PAIR = ("E10", "D10")
 """Short names of the pair that sets the scale."""
-PAPER = "as printed by the paper"
 _NORMAL = 1.2816
 """Standard deviations from the middle to the 10 and 90 % points of a normal distribution."""
 
@@ -40,15 +40,6 @@ class Place:
 
 
 UNKNOWN = Place(math.nan)
-
-
-def readings(material: Material) -> dict[str, Value[Any]]:
-    """Return a silicone's moduli (kPa) by the method of each."""
-    dynamic, slow = material.youngs_modulus_kpa, material.quasistatic_modulus_kpa
-    found: dict[str, Value[Any]] = {}
-    if dynamic is not None:
-        found[PAPER if dynamic.status == "paper" else dynamic.method or "dynamic"] = dynamic
-    return found if slow is None else {**found, slow.method or "quasi-static": slow}
 
 
 @cache
@@ -65,12 +56,6 @@ def _scales() -> dict[str, tuple[list[float], list[float]]]:
     }
     order = sorted(every, key=places.__getitem__)
     return {method: ([of[name] for name in order], [places[name] for name in order]) for method, of in logs.items()}
-
-
-@cache
-def method_spread() -> float:
-    """Return the standard deviation of ln(paper's modulus / other labs') over the silicones that have both."""
-    return float(np.std(np.log(list(spread_of_methods().values())), ddof=1))
 
 
 @cache
@@ -152,13 +137,3 @@ def counts(at: Any, doubt: Any) -> np.ndarray:
 def _ramp(u: np.ndarray) -> np.ndarray:
     """Return the mean of max(u + normal scatter, 0)."""
     return u * ndtr(u) + np.exp(-0.5 * u**2) / math.sqrt(2.0 * math.pi)
-
-
-def spread_of_methods() -> Mapping[str, float]:
-    """Return the paper's modulus over other labs' of each silicone that has both, by its name."""
-    found = {}
-    for name, one in materials().items():
-        printed, slow = readings(one).get(PAPER), one.quasistatic_modulus_kpa
-        if printed and slow:
-            found[name] = float(printed) / float(slow)
-    return found

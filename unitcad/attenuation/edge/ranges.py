@@ -24,7 +24,7 @@ from msgspec import Meta, Struct
 from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.closed_form import Units, borders
-from unitcad.attenuation.edge.contrast import counts, method_spread
+from unitcad.attenuation.edge.contrast import counts
 from unitcad.attenuation.edge.measured import (
     CLASSES,
     COORDINATES,
@@ -50,6 +50,7 @@ from unitcad.attenuation.edge.models import (
 from unitcad.attenuation.edge.scores import LeadScore, scores
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue.entries import between
+from unitcad.catalogue.moduli import method_spread
 from unitcad.text import some
 
 Positive = Annotated[float, between(1e-9, 1e9)]
