@@ -82,9 +82,12 @@ def estimate_arrays(
 def _print_details(data: Mapping[str, Any]) -> None:
     names, sums, matrix = [place["name"] for place in data["places"]], data["sums"], data["matrix"]
     if len(names) <= _MOST_PLACES:
-        each = zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
-        rows = [{"unit": name, "root": number(root, 2), "sum": number(total, 2)} for name, root, total in each]
-        how = "root of the sum of squares, or sum in phase"
+        heads = {"root_sum_of_squares": "root of squares", "in_phase": "in one phase", "worst_phases": "worst phases"}
+        rows = [
+            {"unit": name, **{head: number(sums[key][i], 2) for key, head in heads.items() if sums[key]}}
+            for i, name in enumerate(names)
+        ]
+        how = "root of squares, in one phase (complex sum), at the worst phases"
         print_table(rows, f"sum of all other units there, times one unit's edge level: {how}")
     if 1 < len(names) <= _MOST_PAIRS:
         shares = [["-" if value is None else number(100 * value, 2) for value in row] for row in matrix]
