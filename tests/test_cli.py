@@ -42,13 +42,13 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path):
 
 def test_estimate_says_that_build_would_refuse_the_moulds(tmp_path):
     setting = "layers.0.cap_mm=500"
-    estimated = run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
+    estimated = run("estimate", "encapsulating", "--set", setting, "--model", "published", "--json")
     built = run("build", "encapsulating", "--set", setting, cwd=tmp_path)
     assert (estimated.returncode, built.returncode) == (0, 2)
     reason = built.stderr.removeprefix("error: ")
     assert reason.startswith("layers.0.cap_mm = ")
     assert estimated.stderr == f"warning: encapsulating: its moulds can't be made: {reason}"
-    assert json.loads(estimated.stdout)["models"]["divider"]
+    assert json.loads(estimated.stdout)["models"]["published"]
 
 
 WRONG = {

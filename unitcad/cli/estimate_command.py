@@ -7,18 +7,16 @@ from typing import Annotated, Any
 
 import typer
 from msgspec import to_builtins
-from rich.text import Text
 
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.attenuation.edge.words import compared, lines
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import FREQUENCIES_HZ
-from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
+from unitcad.cli.output import print_head, print_indented, print_json, print_table, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, finite, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, answer_spec, estimate_input, estimate_spec
-from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
 from unitcad.text import join_words, number
@@ -27,11 +25,10 @@ from unitcad.validation import compound_kind, confirm_known, load
 Rows = list[dict[str, str]]
 
 
-def print_head(variant: EstimateInput, lines: Iterable[str]) -> None:
+def print_unit(variant: EstimateInput, lines: Iterable[str]) -> None:
     """Print a unit's name, design, silicones and frequency, and lines under it."""
     layers = " / ".join(layer.material for layer in variant.layers)
-    rest = f": {variant.design}, {layers}, {level(to_builtins(variant.frequency), digits=4)} Hz"
-    console().print(Text.assemble((variant.name, "bold"), rest), soft_wrap=True)
+    print_head(variant.name, f": {variant.design}, {layers}, {level(to_builtins(variant.frequency), digits=4)} Hz")
     print_indented(*lines)
 
 
@@ -301,8 +298,9 @@ def estimate(
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
         return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), frequency, details, as_json)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
-    for spec in loaded:
-        _warn_of_moulds(spec)
+    if details or as_json:
+        for spec in loaded:
+            _warn_of_moulds(spec)
     if as_json:
         with progress("estimate") as stage:
             estimates = [estimate_spec(spec, models, frequency, say=stage) for spec in loaded]
@@ -317,7 +315,7 @@ def estimate(
         if details or FEM in wanted:
             with progress("estimate") as stage:
                 data = last = estimate_spec(spec, models, frequency, say=stage)
-        print_head(
+        print_unit(
             estimate_input(spec, frequency), [*lines(one), *(data["answer"]["details"] if data and details else [])]
         )
         if data:
@@ -332,6 +330,7 @@ def estimate(
 
 def _warn_of_moulds(spec: Spec) -> None:
     """Warn that `build` would refuse the moulds of a unit that can be estimated."""
+    from unitcad.moulds.plan import plan  # the tools' shapes: only the details look at them
 
     if design_of(spec).passes is None:
         return

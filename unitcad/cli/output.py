@@ -8,15 +8,16 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from rich.console import Console
-from rich.table import Column, Table
-from rich.text import Text
+import typer
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.text import printable
 from unitcad.workers import STAGES
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def print_json(data: Any) -> None:
@@ -90,6 +91,8 @@ def console(stderr: bool = False) -> Console:
 
     Only a terminal's width crops a table.
     """
+    from rich.console import Console  # as long to load as all else of a light command, and few print a table
+
     made = Console(markup=False, emoji=False, highlight=False, stderr=stderr)
     if not made.is_terminal:
         made.width = _NO_TERMINAL
@@ -99,6 +102,8 @@ def console(stderr: bool = False) -> Console:
 def print_table(rows: Sequence[Mapping[str, str]], title: str = "") -> None:
     """Print a row a line; the keys of a row are the heads of the columns."""
     if rows:
+        from rich.table import Column, Table
+
         table = Table(*(Column(head, no_wrap=i == 0) for i, head in enumerate(rows[0])), title=title or None)
         for row in rows:
             table.add_row(*row.values())
@@ -108,7 +113,12 @@ def print_table(rows: Sequence[Mapping[str, str]], title: str = "") -> None:
 def print_indented(*lines: str) -> None:
     """Print each line below its head or its table."""
     for line in lines:
-        console().print(f"  {line}", soft_wrap=True)
+        typer.echo(f"  {printable(line)}")
+
+
+def print_head(name: str, rest: str) -> None:
+    """Print a name, bold on a terminal, and the rest of its line."""
+    typer.echo(f"{typer.style(printable(name), bold=True)}{printable(rest)}")
 
 
 _NO_TERMINAL = 10_000
@@ -132,6 +142,8 @@ def progress(name: str) -> Iterator[Callable[[str], None]]:
     if lines or not sys.stderr.isatty():
         yield lines or (lambda stage: None)
         return
+
+    from rich.text import Text
 
     # As Text: a spinner reads markup whatever its console's setting.
     with console(stderr=True).status(Text(name)) as status:
