@@ -319,4 +319,4 @@ def test_arguments_of_another_type_are_refused_in_one_sentence(call, words, tmp_
 def test_a_single_text_is_a_list_of_one(tmp_path):
     built = unitcad.build("encapsulating", tmp_path, formats="stl", only="unit", check=False)
     assert list(built.volumes) == ["layer1", "layer2", "motor", "fpcb"]
-    assert list(unitcad.estimate("encapsulating", models="published").edge) == ["published"]
+    assert list(unitcad.estimate("encapsulating", models="published").models) == ["published"]

@@ -274,7 +274,7 @@ def _units(folder: Path, manifest: ArrayManifest) -> str:
         page = f"{unit}/{PAGE}" if (folder / unit / PAGE).is_file() else f"{unit}/casting.md"
         rows.append(f'<tr><td><a href="{escape(page)}">{escape(unit)}</a></td><td>{count[unit]}</td></tr>')
     level = manifest["estimate"]
-    said = "".join(f"<p>{escape(line)}</p>" for line in level["lines"]) if level else ""
+    said = f"<p>{escape(level['line'])}</p>" if level else ""
     return f"<table><thead><tr><th>unit</th><th>places</th></tr></thead><tbody>{''.join(rows)}</tbody></table>{said}"
 
 

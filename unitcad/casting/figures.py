@@ -333,7 +333,7 @@ class Batch:
         stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic"
         ratio = f"mix ratio, {source_text(for_casting(silicone, 'mix_ratio'))}"
         cure = source_text(for_casting(silicone, "cure_h"))
-        pot, viscosity = silicone.pot_life_min, silicone.mixed_viscosity_cps
+        pot, viscosity, rise = silicone.pot_life_min, silicone.mixed_viscosity_cps, self.rise_min
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
@@ -350,7 +350,7 @@ class Batch:
             ("pouring and striking off", pouring_min(cells), "min", practice),
             viscosity and ("viscosity, mixed", float(viscosity), "cps", source_text(viscosity)),
             ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
-            viscosity and (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
+            rise is not None and (f"rise of a {BUBBLE_MM} mm bubble through it", rise, "min", stokes),
             self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),

@@ -138,7 +138,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         release=out,
         assembly=motor,
         measure=tuple(measurements(moulds, grams, skin_g)),
-        warnings=tuple(warnings(spec, estimate=False)) if plan.makes == "unit" else (),
+        warnings=tuple(warnings(spec)) if plan.makes == "unit" else (),
         troubles=troubles(moulds),
         makes=plan.makes,
         bill=bill(moulds, batches, every, after),

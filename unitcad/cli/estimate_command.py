@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any
 
 import typer
-from rich.text import Text
+from msgspec import to_builtins
 
 from unitcad.attenuation.edge.models import MODELS
+from unitcad.attenuation.edge.words import compared, lines
+from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import FREQUENCIES_HZ
-from unitcad.cli.output import print_json, progress, warn
+from unitcad.cli.output import print_head, print_indented, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, finite, with_fit
-from unitcad.cli.tables import console, print_indented, print_table
+from unitcad.cli.tables import print_table
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
-from unitcad.estimate_inputs import FEM, estimate_spec
-from unitcad.moulds.plan import plan
+from unitcad.estimate_inputs import FEM, answer_spec, estimate_input, estimate_spec
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
 from unitcad.text import join_words, number
@@ -24,16 +26,15 @@ from unitcad.validation import compound_kind, confirm_known, load
 Rows = list[dict[str, str]]
 
 
-def print_estimate(data: dict[str, Any], details: bool = False) -> None:
-    """Print the two lines of the answer; with `details` its basis: models, curve, slopes, assumptions.
+def print_unit(variant: EstimateInput, lines: Iterable[str]) -> None:
+    """Print a unit's name, design, silicones and frequency, and lines under it."""
+    layers = " / ".join(layer.material for layer in variant.layers)
+    print_head(variant.name, f": {variant.design}, {layers}, {level(to_builtins(variant.frequency), digits=4)} Hz")
+    print_indented(*lines)
 
-    The range by finite elements exists only on request; it is always shown.
-    """
-    variant = data["variant"]
-    layers = " / ".join(layer["material"] for layer in variant["layers"])
-    rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
-    console().print(Text.assemble((variant["name"], "bold"), rest), soft_wrap=True)
-    print_indented(*data["answer"]["lines"], *(data["answer"]["details"] if details else []))
+
+def print_estimate(data: dict[str, Any], details: bool = False) -> None:
+    """Print the basis of an answer: the range by finite elements if it was asked for, and with `details` the rest."""
     if "fem" in data:
         print_table(_fem(data["fem"]), "fem: edge level, %, over the draws")
         print_indented(*_fem_lines(data["fem"]))
@@ -64,7 +65,7 @@ def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
     chosen = errors["chosen_without"]
     print_indented(
         f"Rule with its form chosen among {len(chosen['forms'])} without the unit too: "
-        f"{_mean(chosen, chosen['range'])}. p above 0.05: nine units show no difference."
+        f"{_mean(chosen, chosen['range'])}. Nine units do not rank the models."
     )
     by_class = errors["leave_one_class_out"]["by_class"]
     rows = [
@@ -128,7 +129,7 @@ def _models(data: dict[str, Any]) -> Rows:
         ends: dict[str, Any] = block.get("predictive") or {}
         spread = "-" if ends.get("p10") is None else f"{100 * ends['p10']:.3g} to {100 * ends['p90']:.3g}"
         rows.append(row(name, level(block["edge_level"], 100), spread, block))
-    rows.append(row("baseline", f"{100 * answer['class_mean']:.3g} ({answer['class']})"))
+    rows.append(row("baseline", f"{100 * answer['kind_mean']:.3g} ({answer['kind']})"))
     for own in data.get("own_measured", ()):
         rows.append(row("measured here", level(own, 100), f"{own['unit']}, {own['frequency_hz']:g} Hz"))
     measured = data["measured"] or {}
@@ -141,17 +142,15 @@ def _models(data: dict[str, Any]) -> Rows:
 
 def _errors(errors: dict[str, Any]) -> Rows:
     """Tabulate each model's error against the measured values, the least leave-one-out error first."""
-    best = errors["order"][0]
     rows = []
     for name in errors["order"]:
         error = errors[name]
-        own, p = error["leave_one_out"]["levels"], error["against_best"]["p"]
+        own = error["leave_one_out"]["levels"]
         rows.append(
             {
                 "model": name,
                 "levels": f"x {error['levels']['geometric_mean']:.2f}",
                 "leave-one-out": _mean(own, own["range"]),
-                f"p ({best})": "-" if p is None else f"{p:.2g}",
                 "ratios": f"x {error['ratios']['geometric_mean']:.2f}",
                 "directions": f"{error['directions']['right']} of {error['directions']['of']}",
             }
@@ -263,7 +262,7 @@ def estimate(
         str,
         typer.Option(
             metavar="MODEL",
-            help="Model of the details: rule, published, corrected, divider, fem or all. Default: the spec's.",
+            help="Model of the details: rule, published, corrected, fem or all. Default: the spec's.",
         ),
     ] = "",
     frequency: Annotated[
@@ -285,9 +284,9 @@ def estimate(
 ) -> None:
     """Estimate the level at a unit's edge, or an array's crosstalk.
 
-    The first line has the level in per cent of the motor's amplitude, and the 80 % range of the model that leads. If
-    this unit was measured, it has the measurement. The second line has the paper's analytic model and its error. For an
-    array: the share of a unit's motion at its neighbours; several arrays are compared with the first.
+    The first line has the level in per cent of the motor's amplitude, its 80 % range in brackets, and the measurement
+    if this unit was measured. The next lines have the model behind it with its error, and the paper's analytic model.
+    Several specs are compared with the first. For an array: the share of a unit's motion at its neighbours.
     """
 
     if model not in ("", "all", *MODELS, FEM):
@@ -300,24 +299,39 @@ def estimate(
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
         return load_named(kinds[0].estimate)(specs, with_fit(sets, fit), frequency, details, as_json)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
-    for spec in loaded:
-        _warn_of_moulds(spec)
-    with progress("estimate") as stage:
-        estimates = [estimate_spec(spec, models, frequency, say=stage) for spec in loaded]
+    if details or as_json:
+        for spec in loaded:
+            _warn_of_moulds(spec)
     if as_json:
+        with progress("estimate") as stage:
+            estimates = [estimate_spec(spec, models, frequency, say=stage) for spec in loaded]
         print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
         return
 
-    for one in estimates:
-        print_estimate(one, details)
-    if details:
-        print_errors(estimates[0]["table_error"], estimates[0]["models"])
+    asked = [tuple(models or spec.estimate.models) for spec in loaded]
+    answers = [answer_spec(spec, frequency) for spec in loaded]
+    last: dict[str, Any] | None = None
+    for spec, wanted, one in zip(loaded, asked, answers, strict=True):
+        data = None
+        if details or FEM in wanted:
+            with progress("estimate") as stage:
+                data = last = estimate_spec(spec, models, frequency, say=stage)
+        print_unit(
+            estimate_input(spec, frequency), [*lines(one), *(data["answer"]["details"] if data and details else [])]
+        )
+        if data:
+            print_estimate(data, details)
+    for spec, one in zip(loaded[1:], answers[1:], strict=True):
+        typer.echo(f"{spec.name}, compared with {loaded[0].name}: {compared(one, answers[0])}")
+    if details and last:
+        print_errors(last["table_error"], last["models"])
     else:
         typer.echo("How sure? --details prints every model, its errors and slopes, the skin's curve and assumptions")
 
 
 def _warn_of_moulds(spec: Spec) -> None:
     """Warn that `build` would refuse the moulds of a unit that can be estimated."""
+    from unitcad.moulds.plan import plan  # the tools' shapes: only the details look at them
 
     if design_of(spec).passes is None:
         return

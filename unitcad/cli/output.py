@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
+import typer
+
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.text import printable
 
@@ -78,6 +80,17 @@ _ARGUMENTS = {
 def warn(line: str) -> None:
     """Print a line on standard error; control characters are written as escapes."""
     sys.stderr.write(printable(line) + "\n")
+
+
+def print_indented(*lines: str) -> None:
+    """Print each line below its head or its table."""
+    for line in lines:
+        typer.echo(f"  {printable(line)}")
+
+
+def print_head(name: str, rest: str) -> None:
+    """Print a name, bold on a terminal, and the rest of its line."""
+    typer.echo(f"{typer.style(printable(name), bold=True)}{printable(rest)}")
 
 
 STAGES = "UNITCAD_STAGES"

@@ -33,12 +33,6 @@ def print_table(rows: Sequence[Mapping[str, str]], title: str = "") -> None:
         console().print(table)
 
 
-def print_indented(*lines: str) -> None:
-    """Print each line below its head or its table."""
-    for line in lines:
-        console().print(f"  {line}", soft_wrap=True)
-
-
 @contextlib.contextmanager
 def spinner(name: str) -> Iterator[Callable[[str], None]]:
     """Show a spinner with the stage; yield the function that sets the stage."""

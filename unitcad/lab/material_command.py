@@ -11,13 +11,13 @@ import numpy as np
 import typer
 
 from unitcad import catalogue, files
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.catalogue import Material, MaterialEntry, choose
-from unitcad.cli.output import print_json, progress, warn
+from unitcad.cli.output import print_indented, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
-from unitcad.cli.tables import console, print_indented, print_table
+from unitcad.cli.tables import console, print_table
 from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
+from unitcad.json_text import rounded
 from unitcad.lab.material import (
     DynamicResult,
     Specimen,

@@ -15,7 +15,6 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta, Struct
 
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
@@ -24,6 +23,7 @@ from unitcad.catalogue.entries import between
 from unitcad.designs import layer_colour
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import tissue_layer
+from unitcad.json_text import rounded
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union

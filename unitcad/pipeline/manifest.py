@@ -4,7 +4,7 @@ A later version may add keys; those that are here keep their names.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NotRequired, TypedDict
 
 from unitcad import catalogue
@@ -75,23 +75,14 @@ class MeshFindings(TypedDict):
     findings: list[MeshFinding]
 
 
-class ModelLevel(TypedDict):
-    """A model's level at the edge, None if it gives no number, and its mean error against the measured levels."""
-
-    edge: float | None
-    table_error: float | None
-
-
 class EstimateSummary(TypedDict):
-    """The summary of the estimate; `measured` is the paper's level of this unit, None if there is none.
+    """The level at the edge with its 80 % range, the measurement of this unit, None if there is none, and the line."""
 
-    `lines` are the two that lead the estimate; `model` is the one behind the first.
-    """
-
-    models: dict[str, ModelLevel]
-    model: str | None
-    lines: list[str]
+    level: float | None
+    low: float | None
+    high: float | None
     measured: float | None
+    line: str
     frequency_hz: float | None
 
 
@@ -170,7 +161,7 @@ def count_findings(findings: list[MeshFinding]) -> MeshFindings:
 
 
 def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
-    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model.
+    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and the level at the edge.
 
     The manifest is that of the unit, or of an array of it.
     """
@@ -195,6 +186,12 @@ def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
     columns["mould_checks_passed"], columns["mould_checks"] = sum(finding["ok"] for finding in findings), len(findings)
     columns["mould_checks_failed"] = " ".join(sorted({finding["code"] for finding in findings if not finding["ok"]}))
     columns["check_errors"], columns["check_warnings"] = check["errors"], check["warnings"]
-    for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
-        columns[f"edge_{model}"] = level["edge"]
-    return columns
+    return columns | level_columns(manifest["estimate"])
+
+
+LEVEL_COLUMNS = ("level", "low", "high", "measured")
+
+
+def level_columns(level: Mapping[str, Any] | None) -> dict[str, float | None]:
+    """Return the columns of the level at the edge: its value, its 80 % range, the measurement of this unit."""
+    return {} if level is None else {f"edge_{key}": level[key] for key in LEVEL_COLUMNS}

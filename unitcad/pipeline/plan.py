@@ -23,7 +23,6 @@ from unitcad.casting.plates import SPARE_TONGUE, plates
 from unitcad.casting.preparation import slicer_settings
 from unitcad.casting.procedure_text import step_section
 from unitcad.casting.views import BenchPictures, picture_path
-from unitcad.designs import design_of, no_estimate
 from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
 from unitcad.export import glb, printing, svg
 from unitcad.export.printing import TooThin, print_ready
@@ -130,14 +129,6 @@ def check_outputs(only: Sequence[str]) -> tuple[str, ...]:
     if not only:
         raise WrongArgument("only", "", f"needs at least one of {', '.join(OUTPUTS)}", OUTPUTS[0])
     return tuple(name for name in OUTPUTS if name in only)
-
-
-def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
-    """Return the outputs of `only` that the design has, such as no estimate. Raises Refusal if none is left."""
-    possible = tuple(name for name in only if name != "estimate" or design_of(spec).passes)
-    if not possible:
-        raise WrongArgument("only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
-    return possible
 
 
 # Inputs of a file:

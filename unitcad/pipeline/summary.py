@@ -37,7 +37,7 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         yield from casting_summary(json.loads((folder / "casting.json").read_bytes()))
     yield from checks_line(manifest)
     if level := manifest["estimate"]:
-        yield from level["lines"]
+        yield level["line"]
     yield from to_open(folder)
 
 

@@ -11,13 +11,13 @@ from typing import ClassVar
 from unitcad.cache import Store
 from unitcad.casting.figures import check_castable
 from unitcad.casting.procedure import procedure
-from unitcad.designs import design_of, no_estimate
+from unitcad.designs import design_of
 from unitcad.designs.design import Reason
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.geometry import filed, geometric_result
 from unitcad.pipeline.manifest import DRAWING, NO_KERNEL, UNCHECKED, Manifest, Skipped
 from unitcad.pipeline.optional import OptionalFiles
-from unitcad.pipeline.plan import build_key, plan, possible_outputs
+from unitcad.pipeline.plan import build_key, plan
 from unitcad.pipeline.result import Progress, Result
 from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subject import Subject
@@ -52,7 +52,7 @@ class Unit(Subject):
         return build_key(self.moulds, only, check)
 
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
-        return possible_outputs(self.unit, only)
+        return tuple(only)
 
     def with_formats(self, formats: Sequence[Format]) -> Unit:
         return Unit(with_formats(self.unit, tuple(formats)), self.given)
@@ -123,7 +123,6 @@ def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
     yield from design.skipped(spec)
     for name in OUTPUTS:
         if name not in only:
-            # The page offers the command for outputs that were not asked for (report/app/estimate.js).
-            yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
+            yield name, "not asked for (--only)"
     if "step" not in spec.output.formats:
         yield "boundary representation", "no STEP asked for" if find_spec("OCP") else NO_KERNEL
