@@ -333,7 +333,8 @@ class Batch:
         stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic"
         ratio = f"mix ratio, {source_text(for_casting(silicone, 'mix_ratio'))}"
         cure = source_text(for_casting(silicone, "cure_h"))
-        pot, viscosity, rise = silicone.pot_life_min, silicone.mixed_viscosity_cps, self.rise_min
+        pot, viscosity = silicone.pot_life_min, silicone.mixed_viscosity_cps
+        pot_min, rise_min = self.pot_min, self.rise_min
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
@@ -345,12 +346,12 @@ class Batch:
             ("part A", mix.part_a_g, "g", ratio),
             ("part B", mix.part_b_g, "g", ratio),
             ("scale's error on a part", mix.mix_error_pct, "%", digit),
-            pot and ("pot life in this room", self.pot_min, "min", by_temperature + source_text(pot)),
+            pot and pot_min and ("pot life in this room", pot_min, "min", by_temperature + source_text(pot)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),
             viscosity and ("viscosity, mixed", float(viscosity), "cps", source_text(viscosity)),
             ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
-            rise is not None and (f"rise of a {BUBBLE_MM} mm bubble through it", rise, "min", stokes),
+            rise_min and (f"rise of a {BUBBLE_MM} mm bubble through it", rise_min, "min", stokes),
             self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),

@@ -93,6 +93,20 @@ def print_head(name: str, rest: str) -> None:
     typer.echo(f"{typer.style(printable(name), bold=True)}{printable(rest)}")
 
 
+def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
+    """Format a value with its range, or the one of the two that there is; a level next to nothing as below 0.01 %."""
+    if not quantity:
+        return "-"
+    scaled = [None if quantity.get(key) is None else factor * quantity[key] for key in ("value", "low", "high")]
+    value, low, high = (
+        one if one is None else "below 0.01" if factor == 100 and one < 0.01 else f"{one:.{digits}g}" for one in scaled
+    )
+    spread = f"{low} to {high}" if low and high and low != high else ""
+    if value:
+        return f"{value} ({spread})" if spread else value
+    return spread or "not known"
+
+
 STAGES = "UNITCAD_STAGES"
 """Environment variable: the text with which a command begins a line on standard error for each stage of its work."""
 
