@@ -128,8 +128,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
         data = _bytes_of(path, options.limits)
     kind = readers.kind_of(path.name)
     if not kind:
-        known = ", ".join(sorted(readers.SUFFIXES))
-        raise F005.unreadable(f"suffix {path.suffix!r} is not a mesh format; known: {known}")
+        raise F005.unreadable(readers.unknown(path.suffix))
     if not data:
         raise F001.unreadable("the file is empty")
     content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP"}.get(kind)

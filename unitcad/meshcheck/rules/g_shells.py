@@ -35,6 +35,7 @@ G005 = Rule("""
 G006 = Rule("""
     G006 warning: closed cavity
     A shell lies inside another one and faces inwards: a hollow with no way in or out. Resin and support stay inside.
+    Information if it is a slit, thinner than 0.2 mm on average: designers use slits to add perimeters.
     Example: A box has a bubble inside.
     Fix: Open it, or fill it.
 """)
@@ -96,7 +97,9 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     ):
         if len(which) and not (rule is T008 and n == 1 and part.crossings.crossed):
             places = (_where(topology, i) for i in which.tolist())
-            yield rule.finding(counted(len(which), one, many), len(which), places)
+            thick = 2 * -volumes[which] / nesting.area[which]
+            shows = rule is T008 or (thick >= topology.resolution.feature).any()
+            yield rule.finding(counted(len(which), one, many), len(which), places, None if shows else "info")
 
 
 def _without_area(topology: Topology, asked: Bools) -> Bools:

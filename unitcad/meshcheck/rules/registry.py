@@ -15,6 +15,8 @@ from unitcad.errors import Refusal
 from unitcad.meshcheck import rules as folder
 from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, Unreadable, most_locations
 
+_LONGEST = 400  # characters of a message
+
 
 class Rule:
     """A rule by its text: the fault, how bad it is, why it matters, an example, and how to fix it.
@@ -36,6 +38,8 @@ class Rule:
     ) -> Finding:
         """Make a finding, with the rule's severity unless another one is given."""
         kept = tuple(islice(places, most_locations()))
+        if len(message) > _LONGEST:  # a name in it may have megabytes
+            message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 2 :]}"
         return Finding(self.code, severity or self.severity, message, int(count), kept)
 
     def unreadable(

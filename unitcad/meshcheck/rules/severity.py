@@ -18,12 +18,14 @@ def by_layers(part: Inspection, rule: Rule, text: str, n: int, places: Iterable[
     """
     if not n or not (part.disputed.thick or part.disputed.shows or part.strict):
         return
-    severity = None if part.disputed.shows or part.strict else _small(part, part.disputed.thick)
+    severity = (
+        None if part.disputed.shows or part.strict else _small(part.disputed.thick, part.topology.resolution.digit)
+    )
     yield rule.finding(f"{text}{in_layers(part.disputed)}", n, _with_layer(places, part.disputed), severity)
 
 
-def _small(part: Inspection, size: float) -> str:
-    return "warning" if size >= part.topology.resolution.digit else "info"
+def _small(size: float, least: float) -> str:
+    return "warning" if size >= least else "info"
 
 
 def in_layers(disputed: Disputed) -> str:
@@ -56,5 +58,5 @@ def by_width(
     if not (sheets.wide or sheets.wall or part.strict):
         return
     fate = "" if sheets.wall else "; slicers fill it" if sheets.gap else f", {number(sheets.wide, 2)} mm wide at most"
-    severity = None if sheets.wall or part.strict else least or _small(part, sheets.wide)
+    severity = None if sheets.wall or part.strict else least or _small(sheets.wide, part.topology.resolution.thin)
     yield rule.finding(f"{text}{fate}", n, places, severity)
