@@ -43,7 +43,8 @@ G006 = Rule("""
 G007 = Rule("""
     G007 error: volume about zero
     A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness. Faces without an
-    area are T010 alone. A warning, unless --strict is given, if the sheet is narrower than 0.2 mm on average.
+    area are T010 alone. A warning, unless --strict is given, if the sheet is narrower than 0.2 mm on average and other
+    shells have a volume.
     Example: A sheet is drawn as two faces back to back.
     Fix: Give it thickness.
 """)
@@ -81,7 +82,8 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
         worst = which[np.argmax(nesting.area[which])]
         text = f"volume {number(volumes[worst], 3)} mm3 over {number(nesting.area[worst], 3)} mm2 of surface"
         wide = nesting.area[which] / 2 / diagonals(low[which], high[which])  # of each of its two sides
-        severity = None if (wide >= topology.resolution.feature).any() or part.strict else "warning"
+        lost = nesting.flat.all() or (wide >= topology.resolution.feature).any()
+        severity = None if lost or part.strict else "warning"
         yield G007.finding(text, len(which), (_where(topology, i) for i in which.tolist()), severity)
     sound = nesting.sound
     yield from specks(low, high, sound & (volumes > 0))
