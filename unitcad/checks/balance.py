@@ -1,7 +1,7 @@
 """C100: the cavity between tools and earlier layers is the layer, and nothing more.
 
 It compares the drawn unit with the drawn tools, and does not know how either was drawn. In bodies from a file it
-ignores films that are no thicker than their facets' distance from the surface.
+ignores films that are no thicker than twice their facets' distance from the surface.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _of_cavity(cavity: Cavity, facets: float) -> MouldFinding:
     if differ > BALANCE * drawn.volume():
         # Of solids that are alike but for a rounding, the intersection can be larger than either: a second opinion.
         rests = reached - drawn, drawn - reached
-        differ = sum(piece.volume() for rest in rests for piece in (thick_pieces(rest) if facets else [rest]))
+        differ = sum(piece.volume() for rest in rests for piece in (thick_pieces(rest, facets) if facets else [rest]))
     return at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
 
 
