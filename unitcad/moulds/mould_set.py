@@ -17,7 +17,6 @@ from unitcad.kernels import mesh
 from unitcad.kernels.mesh import realise, segment_count, thick_parts
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.cavities import Cavity, cavities, united
-from unitcad.moulds.complement import films
 from unitcad.moulds.cup import rib_spaces
 from unitcad.moulds.layout import Frame, groove_depth_of
 from unitcad.moulds.plan import Plan, Step, plan
@@ -153,12 +152,12 @@ class MouldSet:
 
     @property
     def facets(self) -> float:
-        """The thickness up to which a film between two bodies comes from facets, mm: 0 if no body is from a file."""
+        """Largest distance of this set's facets from the true surface, mm: 0 if no body is from a file."""
         if not is_body_file(self.spec.design):
             return 0.0
         from unitcad.kernels.bounds import deviation
 
-        return films(self.spec) + max(deviation(body.shape, self.segments) for body in self.unit)
+        return FACETS + max(deviation(body.shape, self.segments) for body in self.unit)
 
     def mesh(self, body: Body) -> Manifold:
         """Return a body's mesh, kept once made."""
