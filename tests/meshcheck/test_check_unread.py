@@ -44,6 +44,35 @@ def test_beams_have_their_lines(judge):
     assert place.object == "1"
 
 
+BALLS = 'xmlns:n="http://schemas.microsoft.com/3dmanufacturing/beamlattice/balls/2020/07" n:ballmode="mixed"'
+
+
+@pytest.mark.parametrize(
+    ("attributes", "more", "code", "words"),
+    [
+        ('clippingmode="inside" clippingmesh="77"', "", "P012", "clippingmesh of object 1 names object 77"),
+        ('clippingmode="inside" clippingmesh="1"', "", "P012", "or is itself"),
+        ('representationmesh="77"', "", "P012", "representationmesh of object 1 names object 77"),
+        ('clippingmode="outside"', "", "P017", "without a clippingmesh"),
+        (BALLS, '<n:balls><n:ball vindex="7"/><n:ball vindex="8"/></n:balls>', "P011", "1 ball of object 1"),
+        (BALLS, '<n:balls><n:ball vindex="7"/></n:balls><b:beamsets><b:beamset><n:ballref index="1"/></b:beamset></b:beamsets>',
+         "P011", "an index of the ball sets of object 1 is 1"),
+    ],
+)  # fmt: skip
+def test_a_lattice_names_what_is_there(attributes, more, code, words, judge):
+    one = lattice('<b:beam v1="0" v2="7"/>').replace("<b:beamlattice ", f"<b:beamlattice {attributes} ")
+    report = judge(package(model_xml(one.replace("</b:beams>", f"</b:beams>{more}"))), "a.3mf")
+    assert words in finding(report, code).message
+    assert set(codes(report)) == {code, "P021"}
+
+
+def test_a_clipped_lattice_with_balls_has_no_fault(judge):
+    one = lattice('<b:beam v1="0" v2="7"/>', '<b:ref index="0"/><n:ballref index="0"/>')
+    one = one.replace("<b:beamlattice ", f'<b:beamlattice {BALLS} clippingmode="inside" clippingmesh="2" ')
+    one = one.replace("</b:beams>", '</b:beams><n:balls><n:ball vindex="7"/></n:balls>')
+    assert set(codes(judge(package(model_xml(f'<object id="2">{mesh_xml()}</object>{one}')), "a.3mf"))) == {"P021"}
+
+
 CONFIG = '<config><object id="1">{}</object></config>'
 VOLUME = '<volume firstid="{}" lastid="{}"><metadata type="volume" key="{}" value="{}"/></volume>'
 
@@ -100,6 +129,13 @@ def test_an_end_record_that_contradicts_the_directory(field, more, judge):
     at = data.rfind(b"PK\x05\x06") + field
     data[at] = (data[at] + more) % 256
     assert [found.code for found in judge(bytes(data), "a.3mf").findings] == ["F003"]
+
+
+@pytest.mark.parametrize("more", [1, 100])
+def test_bytes_after_the_zip_are_trailing_bytes(more, judge):
+    report = judge(package() + bytes(more), "a.3mf")
+    assert codes(report) == {"F006": "warning"}
+    assert report.facts.volume_mm3 == pytest.approx(1000)
 
 
 def test_a_comment_of_the_zip_is_none(judge):

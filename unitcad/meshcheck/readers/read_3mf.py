@@ -132,8 +132,16 @@ def _mesh(model: Model, resource: Object, mesh: Triangles) -> None:
 
 
 def _beams(model: Model, resource: Object, n: int) -> None:
-    """Check the beams on the `n` vertices of an object: beam lattice extension 1.2, chapter 2."""
-    who, beams = f"object {resource.id}", resource.beams
+    """Check the beams and balls on the `n` vertices of an object: beam lattice extension 1.2, chapter 2."""
+    who, beams, balls = f"object {resource.id}", resource.beams, np.array(resource.balls, np.int64).reshape(-1, 2)
+    for key in ("clippingmesh", "representationmesh"):
+        if key in resource.lattice:
+            _used(model, int(resource.lattice[key]), resource.rank - 1, f"{key} of {who}")
+    if resource.lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in resource.lattice:
+        model.add(P017, f"the beam lattice of {who} is clipped without a clippingmesh")
+    if (outside := balls[:, 0] >= n).any():
+        text = f"{counted(int(outside.sum()), 'ball')} of {who} with a vertex that is not there"
+        model.add(P011, text, line=int(balls[outside.argmax(), 1]))
     for rule, wrong, what in (
         (P011, (beams[:, :2] >= n).any(axis=1), "with a vertex that is not there"),
         (P017, beams[:, 0] == beams[:, 1], "with one vertex twice"),
@@ -141,8 +149,8 @@ def _beams(model: Model, resource: Object, n: int) -> None:
     ):
         if wrong.any():
             model.add(rule, f"{counted(int(wrong.sum()), 'beam')} of {who} {what}", line=int(beams[wrong.argmax(), 4]))
-    if (most := max(resource.beam_sets, default=-1)) >= len(beams):
-        _in_range(model, most, len(beams), f"an index of the beam sets of {who}")
+    for noun, indices, there in (("beam", resource.beam_sets, beams), ("ball", resource.ball_sets, balls)):
+        _in_range(model, max(indices, default=-1), len(there), f"an index of the {noun} sets of {who}")
 
 
 def _triangle_properties(model: Model, resource: Object, rows: Ints) -> None:

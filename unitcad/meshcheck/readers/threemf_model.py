@@ -331,7 +331,7 @@ class _Reader:
             if take is not None:
                 take(attributes)
                 return
-        if space == schema.BEAM:
+        if space in (schema.BEAM, schema.BALLS):
             self._take_lattice(local, attributes)
         elif "id" in attributes and parent == "resources":
             self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
@@ -343,6 +343,8 @@ class _Reader:
     def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
         if local == "beamlattice":
             self.radius = attributes["radius"]
+            if isinstance(self.resource, Object):
+                self.resource.lattice = attributes
         elif local == "beam":
             first = attributes.get("r1", self.radius)
             ends = attributes["v1"], attributes["v2"], first, attributes.get("r2", first)
@@ -350,6 +352,11 @@ class _Reader:
             self._count_faces(1)
         elif local == "ref" and isinstance(self.resource, Object):
             self.resource.beam_sets.append(int(attributes["index"]))
+        elif local == "ballref" and isinstance(self.resource, Object):
+            self.resource.ball_sets.append(int(attributes["index"]))
+        elif local == "ball" and isinstance(self.resource, Object):
+            self.resource.balls.append((int(attributes["vindex"]), self.parser.CurrentLineNumber))
+            self._count_faces(1)
 
     def _once(self, id_: int) -> None:
         if id_ in self.model.resources or id_ in self.model.foreign:

@@ -21,7 +21,7 @@ from xml.parsers import expat
 
 from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted
-from unitcad.meshcheck.rules.f_file import F003, F009, F011, Deadline, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F003, F006, F009, F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P006, P007, P008
 from unitcad.meshcheck.rules.registry import Rule
 
@@ -253,6 +253,9 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise F003.unreadable(f"the zip's end record contradicts its directory: {why}")
     if len(entries) > limits.max_entries:
         raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
+    end = _end_record(data)
+    if more := len(data) - end - 22 - int.from_bytes(data[end + 20 : end + 22], "little"):
+        package.add(F006, f"{counted(more, 'byte')} after the end of the zip")
     bombs = []
     for info in entries:
         name = info.filename
@@ -276,11 +279,16 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     return package
 
 
+def _end_record(data: memoryview) -> int:
+    """Return the place of the end record, which `zipfile` has found before."""
+    return max(len(data) - _END_RECORD, 0) + bytes(data[-_END_RECORD:]).rfind(b"PK\x05\x06")
+
+
 def _contradicts(data: memoryview, archive: zipfile.ZipFile) -> str | None:
     """Return how the end record differs from the directory that was read; None if it does not, or for a zip64."""
-    at = bytes(data[-_END_RECORD:]).rfind(b"PK\x05\x06")
-    on_disk, total, size, offset = struct.unpack_from("<HHII", data, max(len(data) - _END_RECORD, 0) + at + 8)
-    if at < 0 or 0xFFFF in (on_disk, total) or 0xFFFFFFFF in (size, offset):
+    at = _end_record(data)
+    on_disk, total, size, offset = struct.unpack_from("<HHII", data, at + 8)
+    if 0xFFFF in (on_disk, total) or 0xFFFFFFFF in (size, offset):
         return None
     there = len(archive.infolist())
     if not on_disk == total == there:

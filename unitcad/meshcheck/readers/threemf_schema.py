@@ -167,15 +167,24 @@ def _beams() -> dict[str, ElementSchema]:
     }
 
 
+def _balls() -> dict[str, ElementSchema]:
+    return {
+        "balls": ElementSchema(children=(("ball", 0, _MANY),)),
+        "ball": ElementSchema({"vindex": index}, {"r": number, "p": index, "pid": resource_id}),
+        "ballref": ElementSchema({"index": index}),
+    }
+
+
 ELEMENTS: dict[str, dict[str, ElementSchema]] = {
     CORE: _core(),
     MATERIAL: _material(),
     BEAM: _beams(),
+    BALLS: _balls(),
 }
 UNCHECKED = {
     BEAM: "a beam lattice: its indices and radii are checked, its shape is not",
     SLICE: "slices are not checked",
-    BALLS: "the balls of a beam lattice are not checked",
+    BALLS: "the balls of a beam lattice: their vertices are checked, their shape is not",
     BOOLEAN: "boolean operations are not checked",
     DISPLACEMENT: "displacement is not checked",
     OLD_DISPLACEMENT: "displacement is not checked",
@@ -224,7 +233,8 @@ class Triangles:
 class Object(Resource):
     """An object: a mesh or components.
 
-    `beams` (b, 5) are v1, v2, r1, r2 and the line of the beams on the mesh's vertices, `beam_sets` indices of beams.
+    `beams` (b, 5) are v1, v2, r1, r2 and the line of the beams on the mesh's vertices, `balls` (vertex, line) pairs.
+    `beam_sets` and `ball_sets` are indices of beams and balls, `lattice` the attributes of the lattice.
     """
 
     type: str = "model"
@@ -233,6 +243,9 @@ class Object(Resource):
     other_shape: bool = False
     beams: Floats = field(default_factory=lambda: np.empty((0, 5)))
     beam_sets: list[int] = field(default_factory=list)
+    balls: list[tuple[int, int]] = field(default_factory=list)
+    ball_sets: list[int] = field(default_factory=list)
+    lattice: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass

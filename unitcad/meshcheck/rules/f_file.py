@@ -56,8 +56,8 @@ F005 = Rule("""
 
 F006 = Rule("""
     F006 warning: trailing bytes
-    Bytes follow the last facet, endsolid, or the last element that a PLY or OFF promises. Readers ignore them, or count
-    facets from the size and disagree.
+    Bytes follow the last facet, endsolid, the zip of a 3MF, or the last element that a PLY or OFF promises. Readers
+    ignore them, or count facets from the size and disagree.
     Example: A binary STL has 16 bytes of a checksum after its last facet.
     Fix: Export again, or cut the file after its last facet.
 """)
