@@ -43,6 +43,8 @@ def drawing(meshes: list[Mesh] | None) -> Iterator[None]:
 SEVERITIES = ("info", "warning", "error")
 _MOST_CODES = 5
 """Codes that a report's repr lists."""
+MOST_COUNTED = 10_000
+"""Places that a finding counts one by one."""
 
 
 Point = tuple[float, float, float]
@@ -117,7 +119,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Finding:
-    """One rule that a file breaks: how often, and its first places.
+    """One rule that a file breaks: how often, up to MOST_COUNTED, and its first places.
 
     `ends`: it ended the check of the file, so that other rules were not run; no filter drops it.
     """
@@ -227,6 +229,11 @@ def counted(n: int, one: str, many: str = "") -> str:
     return f"{n} {one if n == 1 else many or one + 's'}"
 
 
+def tally(n: int, one: str, many: str = "") -> str:
+    """Write `2 edges` as `counted` does, and `more than 10,000 edges` from there on."""
+    return counted(n, one, many) if n <= MOST_COUNTED else f"more than {MOST_COUNTED:,} {many or one + 's'}"
+
+
 def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Merge to one finding a rule, the worst first.
 
@@ -242,11 +249,12 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def _together(alike: list[Finding]) -> Finding:
     count = sum(finding.count for finding in alike)
     message = "; and ".join(list(dict.fromkeys(finding.message for finding in alike))[:2])
+    whole = count if count < MOST_COUNTED else f"{MOST_COUNTED:,} or more"
     return Finding(
         alike[0].code,
         max((finding.severity for finding in alike), key=SEVERITIES.index),
-        f"{message} ({count} in all)" if len(alike) > 1 else message,
-        count,
+        f"{message} ({whole} in all)" if len(alike) > 1 else message,
+        min(count, MOST_COUNTED),
         tuple(islice(chain.from_iterable(finding.locations for finding in alike), most_locations())),
         any(finding.ends for finding in alike),
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.meshcheck.findings import Finding, Location, counted, number, point
+from unitcad.meshcheck.findings import Finding, Location, counted, number, point, tally
 from unitcad.meshcheck.geometry.predicates import without_area
 from unitcad.meshcheck.geometry.resolution import Resolution
 from unitcad.meshcheck.geometry.topology import Topology, diagonals
@@ -88,7 +88,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     sound = nesting.sound
     yield from specks(low, high, sound & (volumes > 0))
     pairs = nesting.overlaps
-    text = f"{counted(len(pairs), 'pair')} of shells that share volume"
+    text = f"{tally(len(pairs), 'pair')} of shells that share volume"
     yield from by_layers(part, G002, text, len(pairs), (_where(topology, *pair) for pair in pairs))
     if nesting.stopped is not None:
         raise nesting.stopped
@@ -101,7 +101,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
             places = (_where(topology, i) for i in which.tolist())
             thick = 2 * -volumes[which] / nesting.area[which]
             shows = rule is T008 or (thick >= topology.resolution.feature).any()
-            yield rule.finding(counted(len(which), one, many), len(which), places, None if shows else "info")
+            yield rule.finding(tally(len(which), one, many), len(which), places, None if shows else "info")
 
 
 def _without_area(topology: Topology, asked: Bools) -> Bools:
@@ -126,7 +126,7 @@ def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
     if not len(tiny) or side.max() < BODY:
         return []
     places = [Location(xyz=point(middle)) for middle in (low[tiny] + high[tiny]) / 2]
-    text = f"{counted(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
+    text = f"{tally(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
     return [G010.finding(text, len(tiny), places)]
 
 

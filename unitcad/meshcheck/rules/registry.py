@@ -13,7 +13,7 @@ from types import ModuleType
 
 from unitcad.errors import Refusal
 from unitcad.meshcheck import rules as folder
-from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, Unreadable, most_locations
+from unitcad.meshcheck.findings import MOST_COUNTED, SEVERITIES, Finding, Location, Unreadable, most_locations
 
 _LONGEST = 400  # characters of a message
 
@@ -40,7 +40,7 @@ class Rule:
         kept = tuple(islice(places, most_locations()))
         if len(message) > _LONGEST:  # a name in it may have megabytes
             message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 2 :]}"
-        return Finding(self.code, severity or self.severity, message, int(count), kept)
+        return Finding(self.code, severity or self.severity, message, min(int(count), MOST_COUNTED), kept)
 
     def unreadable(
         self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None
