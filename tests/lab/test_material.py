@@ -23,7 +23,6 @@ from unitcad.lab.material import (
     Specimen,
     evaluate,
     evaluate_dynamic,
-    fit_start,
     header_of,
     moduli,
     parse_column,
