@@ -66,7 +66,7 @@ def fit_toe(strain: Floats, stress: Floats, low: float, high: float) -> Toe | No
 
     The origin is not below no strain: a pretension of 1 %, recorded as none, makes the secant 2 % less.
 
-    None with fewer than six points there, or if the stress does not rise.
+    None with fewer than six points there, or if the interval (95 %) of the secant has zero in it.
     """
     begin = min(0.0, float(strain[0]))
     reach = min(max(REACH * high, LEAST_REACH), MOST_REACH)
@@ -93,8 +93,11 @@ def fit_toe(strain: Floats, stress: Floats, low: float, high: float) -> Toe | No
         return None
     variance = np.einsum("i,mij,j->m", secant, found.covariance[:, 1:, 1:], secant)
     fitted = float(np.sqrt(found.weights @ (variance + (values - value) ** 2)))
+    fitted *= stdtrit(found.freedom, 0.975)
+    if fitted >= value:
+        return None
     step = _step(stress) / np.sqrt(12) * float(np.mean(1 / use))
-    error = np.hypot(stdtrit(found.freedom, 0.975) * fitted / value, 2 * step / value)
+    error = np.hypot(fitted / value, 2 * step / value)
     constants = found.weights @ found.constants
     corner = float(found.weights @ found.corners)
     middle = float(found.weights @ found.origins)
