@@ -68,9 +68,7 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
     one.
     """
     solid = manifold3d.Manifold(
-        manifold3d.Mesh64(
-            np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64)
-        )
+        manifold3d.Mesh64(np.array(vertices, np.float64, order="C"), np.array(faces, np.uint64, order="C"))
     )
     step = resolution(vertices)
     for power in range(1, ROUNDS + 1):
