@@ -178,3 +178,10 @@ def test_a_long_name_has_the_rule_of_a_short_one_and_a_short_message():
         found.append(check_bytes(package(model_xml(before=before), compression=0), "a.3mf").findings)
     assert [[item.code for item in one] for one in found] == [["P017"], ["P017"]]
     assert len(found[1][0].message) < 500
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_metadata_behind_the_resources_fails_no_file_unless_3mf_is_read_strictly(strict, judge):
+    model = model_xml(f'<object id="1">{mesh_xml()}</object>')
+    late = model.replace("</resources>", '</resources><metadata name="Title">a</metadata>')
+    assert codes(judge(package(late), "a.3mf", strict_3mf=strict)) == {"P017": "error" if strict else "warning"}

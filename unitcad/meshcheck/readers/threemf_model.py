@@ -293,7 +293,8 @@ class _Reader:
             if parent.counts[name] == most + 1:
                 self.model.add(P017, f"<{parent.name}> has <{local}> more than once")
             if parent.rules.ordered and place < parent.last:
-                self.model.add(P017, f"<{local}> is out of order in <{parent.name}>")
+                add = self.model.add_lenient if local == "metadata" else self.model.add
+                add(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
         if rules is None or parent.name != "resources":

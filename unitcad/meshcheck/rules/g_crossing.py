@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -111,7 +112,17 @@ def _touching(part: Inspection, faces: Faces) -> Iterator[Finding]:
     if not n:
         return
     some = " among those compared" if crossings.contact.full or crossings.near.full else ""
-    yield G003.finding(f"{tally(n, 'pair')} of shells that touch{some}", n, _places(faces, pairs[first]))
+    yield G003.finding(f"{tally(n, 'pair')} of shells that touch{some}", n, _between(part, faces, pairs[first]))
+
+
+def _between(part: Inspection, faces: Faces, pairs: Ints) -> Iterator[Location]:
+    """Return the places of pairs, one for two shells, each with the middle of the room that their boxes share."""
+    topology = part.topology
+    shell = dict(zip(faces.original[pairs].ravel().tolist(), faces.shell[pairs].ravel().tolist(), strict=True))
+    for place in _places(faces, pairs):
+        both = [shell[face] for face in place.faces]
+        middle = (topology.low[both].max(axis=0) + topology.high[both].min(axis=0)) / 2
+        yield replace(place, centre=point(middle))
 
 
 def _places(faces: Faces, pairs: Ints) -> list[Location]:

@@ -130,8 +130,8 @@ P016 = Rule("""
 P017 = Rule("""
     P017 error: against the schema
     An element or attribute is missing, unknown, repeated, out of order, of the wrong type, or forbidden (xml:space, xsi
-    attributes). Unless --3mf-strict is given, an unknown attribute without a prefix is information and metadata of one
-    name a warning, since common programs write such files.
+    attributes). Unless --3mf-strict is given, an unknown attribute without a prefix is information, and metadata of one
+    name or behind the resources a warning, since common programs write such files.
     Example: A `<triangle>` has v1 and v2, and no v3.
     Fix: Write the element by its 3MF schema.
 """)
