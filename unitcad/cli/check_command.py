@@ -304,7 +304,12 @@ def check(
         )
     for pattern, codes in settings.per_file_ignores.items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
-    known = baselines.read(base) if base is not None and diff is None and writes != base else {}
+    known: baselines.Baseline = {}
+    if base is not None and diff is None and writes is None:
+        if not base.exists():
+            field = "--baseline" if baseline is not None else configuration.name("baseline")
+            raise Refusal(field, base.as_posix(), f"{no_such_file(base)}; --write-baseline {base.as_posix()} writes it")
+        known = baselines.read(base)
     draw = drawn = None
     if pictures is not None:
         from unitcad.export import finding_pictures  # loads Pillow
