@@ -76,6 +76,16 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder):
     assert manifest["check"]["findings"] == []
 
 
+def test_the_manifest_says_that_the_sheet_is_as_cast(folder):
+    """Its pockets are as narrow as cast; in the assembly they are stretched round the units."""
+    parts = {part["name"]: part for part in json.loads((folder / "manifest.json").read_text())["parts"]}
+    (sheet,) = [part for part in patch_parts(load_array("forearm-pockets", SMALL)) if part.name == "sheet"]
+    stretched = realise(sheet.body.shape, 96).volume()
+    assert parts["layer1"]["state"].startswith("as cast")
+    assert parts["layer1"]["volume_mm3"] > 1.005 * stretched
+    assert [name for name, part in parts.items() if "state" in part] == ["layer1"]
+
+
 def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up():
     """Nine units in two cavities: five castings of two pours each, then the sheet's pour."""
     array = load_array("forearm-pockets", ["moulds.cavities=[2, 1]"])

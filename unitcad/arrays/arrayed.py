@@ -204,6 +204,9 @@ def _given(moulds: PatchMoulds, unit: Spec) -> frozenset[str]:
     return frozenset(key.removeprefix(path) for key in moulds.given for path in paths if key.startswith(path))
 
 
+AS_CAST = "as cast; in patch.step and patch.glb its pockets are stretched round the units"
+
+
 def _patch(moulds: PatchMoulds, store: Store) -> Result:
     """Return parts and files of the silicone that the units share, and the files of the whole patch."""
     blank, bodies, formats = moulds.blank, patch_bodies(moulds.array), moulds.spec.output.formats
@@ -215,6 +218,8 @@ def _patch(moulds: PatchMoulds, store: Store) -> Result:
         part = PartRecord(**{**record(blank, body), "material": material, "files": {}})
         if (solids := len(blank.mesh(body).decompose())) > 1:
             part["solids"] = solids
+        if moulds.construction.own_tails:
+            part["state"] = AS_CAST
         if "stl" in formats:
             path = f"patch/{file_stem(body)}.stl"
             made.shared[path] = store.file(body_key(blank, body, "stl"), partial(stl_content, blank, body))

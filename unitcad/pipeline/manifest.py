@@ -32,7 +32,7 @@ class BodyFile(TypedDict):
 class PartRecord(TypedDict):
     """A body of unit or tooling; `files` by format, `bbox_mm` the mesh's (x0, y0, z0, x1, y1, z1).
 
-    `solids`: their number, if more than one.
+    `solids`: their number, if more than one. `state`: how its file has a body that another file has stretched.
     """
 
     name: str
@@ -45,6 +45,7 @@ class PartRecord(TypedDict):
     triangles: int
     files: dict[str, BodyFile]
     solids: NotRequired[int]
+    state: NotRequired[str]
 
 
 class PourRecord(TypedDict):
