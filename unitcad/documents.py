@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import islice
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -355,3 +356,22 @@ def all_finite(value: Any) -> bool:
         elif isinstance(one, float) and one - one != 0.0:
             return False
     return True
+
+
+SIGNIFICANT_DIGITS = 9
+
+
+def rounded(data: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
+    """Return `data` with its floats to `digits` significant digits, and None for floats that are not finite.
+
+    So the last bits of a platform do not show.
+    """
+    if isinstance(data, str):  # the most frequent
+        return data
+    if isinstance(data, float):
+        return float(f"{data:.{digits}g}") if isfinite(data) else None
+    if isinstance(data, dict):
+        return {key: rounded(value, digits) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):  # a union would be made anew at each call
+        return [rounded(value, digits) for value in data]
+    return data

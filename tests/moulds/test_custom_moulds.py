@@ -230,16 +230,6 @@ def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path):
     assert broken(moulds) == set()
 
 
-@pytest.mark.parametrize("earlier", [False, True])
-def test_only_an_estimate_is_refused_beside_a_result_too(earlier, tmp_path):
-    if earlier:
-        built(tmp_path, lugs(), layers=2)
-    there = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()}
-    with pytest.raises(Refusal, match=r"^only = 'estimate'.*has no estimate: the models describe"):
-        built(tmp_path, lugs(), "estimate", layers=2)
-    assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()} == there
-
-
 CUSTOM = templates()["embedded"].parent / "custom"
 FLAT_TOP = {"parameters.flat_mm": 1.6}
 

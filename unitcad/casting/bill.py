@@ -128,7 +128,7 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
         note += f", mass {number(motor.mass_g, 3)} g" if motor.mass_g else ""
     if not spec.motor.absent:
         yield Item(motor_name(spec), cells, "piece", "bought", note)
-    if any(body.kind == "circuit" for body in moulds.laid_later):
+    if any(body.kind == "circuit" for body in moulds.plan.laid_later):
         yield Item("flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say")
     if fpcb := spec.fpcb:
         sides = {"one": "one side", "both": "both sides"}.get(fpcb.tail, fpcb.tail)

@@ -217,7 +217,7 @@ class Batch:
     @cached_property
     def mix(self) -> Mix:
         """Weights for all cavities and channels."""
-        poured = self.volume_mm3 * len(self.step.layer) / self.moulds.pieces(self.step.name)
+        poured = self.volume_mm3 * len(self.step.layer) / self.step.solids
         return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3)
 
     @property
@@ -325,7 +325,7 @@ class Batch:
         practice = "assumed: usual practice"
         channels = " + sprue and vents" if step.channels else ""
         # An array's layers are drawn of all units together.
-        whole = len(step.layer) // self.moulds.pieces(step.name) != cells
+        whole = len(step.layer) // step.solids != cells
         what, times = ("volume of this pour", "volume") if whole else ("volume of one layer", "volume x cavities")
         taken = f"({times}{channels})" if channels or not whole else times
         more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
@@ -334,6 +334,7 @@ class Batch:
         ratio = f"mix ratio, {source_text(for_casting(silicone, 'mix_ratio'))}"
         cure = source_text(for_casting(silicone, "cure_h"))
         pot, viscosity = silicone.pot_life_min, silicone.mixed_viscosity_cps
+        pot_min, rise_min = self.pot_min, self.rise_min
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
@@ -345,12 +346,12 @@ class Batch:
             ("part A", mix.part_a_g, "g", ratio),
             ("part B", mix.part_b_g, "g", ratio),
             ("scale's error on a part", mix.mix_error_pct, "%", digit),
-            pot and ("pot life in this room", self.pot_min, "min", by_temperature + source_text(pot)),
+            pot and pot_min and ("pot life in this room", pot_min, "min", by_temperature + source_text(pot)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),
             viscosity and ("viscosity, mixed", float(viscosity), "cps", source_text(viscosity)),
             ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
-            viscosity and (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
+            rise_min and (f"rise of a {BUBBLE_MM} mm bubble through it", rise_min, "min", stokes),
             self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),

@@ -130,7 +130,7 @@ def shapes(moulds: MouldSet, item: Placed | Extra, unit: bool) -> list[tuple[Sha
         return [(item.shape, item.colour)]
     plan = moulds.plan
     if unit:
-        bodies = *moulds.unit, *moulds.laid_later, *moulds.pushed_in
+        bodies = *moulds.unit, *moulds.plan.laid_later, *moulds.plan.pushed_in
     else:
         bodies = dict.fromkeys((*plan.tools, *made_pieces(moulds), *plan.steps[-1].inserts))
     cast = [(step, shape) for step in plan.steps if step.name == item.name and not unit for shape in step.layer]
@@ -151,8 +151,8 @@ def pour_picture(pour: int, name: str) -> str:
 def _views(moulds: MouldSet) -> Views:
     plan, bottom = moulds.plan, moulds.plate[0]
     yield "pieces", View(place_pieces(made_pieces(moulds)), eye=OVER, group="pieces")
-    if moulds.cast_flat:
-        yield from _curved(moulds, moulds.cast_flat, views(moulds.cast_flat))
+    if moulds.inner:
+        yield from _curved(moulds, moulds.inner, views(moulds.inner))
         return
     base, first = place_pieces(plan.of_kind("base")), plan.steps[0]
     if not plan.of_kind("cup"):
@@ -186,7 +186,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
     if moulds.design.laid_in == step.index:
         yield "laid-in", View((*cured, *place_pieces(step.inserts, z=2 * CLEAR)))
     cured = *cured, *place_pieces(step.inserts)
-    if moulds.greased(step):
+    if step.greased:
         meshes = [mesh for mesh in moulds.meshes(step.seals[:1]) if not mesh.is_empty()]
         points = [max(np.asarray(arrays(mesh)[0], float).tolist(), key=np.array(ABOVE).dot) for mesh in meshes]
         yield (
@@ -321,11 +321,11 @@ def _demoulding(moulds: MouldSet) -> Views:
 def _motor_in(moulds: MouldSet) -> Views:
     """Yield the views of motor and circuit going in: a unit that opens to the skin is on its back."""
     steps, dims = fittings(moulds), moulds.dimensions
-    inside = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
+    inside = [body for body in (*moulds.unit, *moulds.plan.laid_later) if body.made != "cast"]
     if not inside or moulds.design.laid_in:
         return
     below, places = moulds.design.opens == "below", {fitting.place for fitting in steps}
-    cast = place_pieces((body for body in moulds.unit if body.kind == "layer"), half=not moulds.laid_later)
+    cast = place_pieces((body for body in moulds.unit if body.kind == "layer"), half=not moulds.plan.laid_later)
     eye = UNDER if below else LOW
 
     def view(parts: Iterable[Placed], extras: tuple[Extra, ...] = (), way: int = -1) -> View:
@@ -349,7 +349,7 @@ def _motor_in(moulds: MouldSet) -> Views:
     if "in" in places:
         yield "motor-in", view(place_pieces(inside, z=away), leads)
     if "home" in places or any(fitting.mixed or ADHESIVE in fitting.required_tools for fitting in steps):
-        whole = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
+        whole = [body for body in (*moulds.unit, *moulds.plan.laid_later) if body.made != "cast"]
         yield "motor-home", view(place_pieces(whole))
 
 
@@ -393,13 +393,13 @@ def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
     up = step.rim + 2 * CLEAR
     yield "peel", View((*tray, *place_pieces([step], z=up)), way=1)
     if cast := {
-        body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.pushed_in if body.made == "cast"
+        body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.plan.pushed_in if body.made == "cast"
     }:
         # The sheet, its back up, and the units under their pockets, each named by its place.
         down = max(high for *_, high in cast.values()) + CLEAR
         middles = {name: ((box[0] + box[3]) / 2, (box[1] + box[4]) / 2, step.rim) for name, box in cast.items()}
         names = tuple(Name(name, at, on=True) for name, at in middles.items())
-        parts = *place_pieces(moulds.unit), *place_pieces(moulds.pushed_in, z=-down)
+        parts = *place_pieces(moulds.unit), *place_pieces(moulds.plan.pushed_in, z=-down)
         yield "units-in", View(parts, (), OVER, "unit", names=names)
 
 
@@ -472,7 +472,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
         parts = *apart, (cut(whole, rest), last.direction)
         extras += [Extra(part, layer_colour(pour), _along(way, up)) for part, way in parts]
     yield "peel", View(place_pieces([base]), tuple(extras), group="curved", way=1)
-    bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.laid_later)}
+    bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.plan.laid_later)}
     for name in ("motor-in", "motor-home"):
         # Flat parts here have the names of those cast round the limb: they are drawn by their shapes.
         shapes = (Extra(bodies[part.name].shape, bodies[part.name].colour, part.moved) for part in flat[name].parts)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
@@ -19,16 +19,19 @@ from msgspec import Meta, Struct, field
 
 from unitcad import catalogue, files
 from unitcad.catalogue import Printer, printers
+from unitcad.cli.output import progress
 from unitcad.documents import parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
 from unitcad.files import no_such_file, path_seen_from
-from unitcad.meshcheck import Limits, Options, file_checks
+from unitcad.meshcheck import FileReport, Limits, Options, file_checks
+from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
-from unitcad.meshcheck.output import FORMATS, render
+from unitcad.meshcheck.output import FORMATS, failing, render
 from unitcad.meshcheck.rules.registry import check_prefixes
 from unitcad.meshcheck.rules.registry import explain as explanation
 from unitcad.meshcheck.rules.s_scale import unit_named
 from unitcad.rooms import expect_none_but, load
+from unitcad.text import printable
 
 
 class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
@@ -46,6 +49,7 @@ class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, re
     max_faces: Annotated[int, Meta(ge=1)] | None = None
     timeout: Annotated[float, Meta(ge=0.001)] | None = None
     memory: Annotated[int, Meta(ge=200)] | None = None
+    baseline: str | None = None
 
 
 NAME = "unitcad.toml"
@@ -69,6 +73,13 @@ class Configuration(Struct, frozen=True, kw_only=True):
     def shown(self) -> str | None:
         """Path of the file from the working directory."""
         return None if self.path is None else path_seen_from(self.path)
+
+    @property
+    def baseline(self) -> Path | None:
+        """The file of known findings that the settings name, from their folder."""
+        if self.path is None or self.settings.baseline is None:
+            return None
+        return Path(path_seen_from(self.path.parent / self.settings.baseline))
 
     def ignored(self, path: str) -> list[str]:
         """Return prefixes of codes that per-file-ignores drops for a file; patterns start at the settings' folder."""
@@ -211,6 +222,25 @@ def check(
         str | None,
         typer.Option(metavar="DIR", help="Folder for pictures of findings. Default: none."),
     ] = None,
+    diff: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar="OLD NEW", help="Compare two versions of a file or a folder; only new findings fail. Default: none."
+        ),
+    ] = None,
+    baseline: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Known findings, which do not fail. Default: those of the settings, or none."
+        ),
+    ] = None,
+    write_baseline: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Write the findings of this run to a file as known. Default: none."),
+    ] = None,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print the findings that fail, and one line of sums.")
+    ] = False,
     config: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Settings: a TOML file with a [check] table. Default: the nearest one."),
@@ -239,12 +269,18 @@ def check(
         raise unknown_name("--output-format", output_format, FORMATS)
     if pictures is not None and Path(pictures).exists() and not Path(pictures).is_dir():
         raise Refusal("--pictures", pictures, "must name a folder; this is a file")
+    if quiet and output_format != "text":
+        raise Refusal(
+            "--quiet", output_format, "shortens the text report; --report FORMAT=FILE writes another one, too"
+        )
     copies = [_copy(given, FORMATS) for given in report or []]
     configuration = find(config)
     settings = configuration.settings
     level = fail_on or settings.fail_on or "error"
     if level not in ("error", "warning"):
         raise unknown_name("--fail-on", level, ("error", "warning"))
+    base = configuration.baseline if baseline is None else Path(baseline)
+    writes = None if write_baseline is None else Path(write_baseline)
     options = Options(
         select=check_prefixes(*configuration.chosen("select", _split(select))),
         ignore=check_prefixes(*configuration.chosen("ignore", _split(ignore))),
@@ -254,24 +290,46 @@ def check(
         strict=bool(settings.strict if strict is None else strict),
         strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
         limits=_limits(max_faces or settings.max_faces, *configuration.chosen("timeout", timeout)),
-        draw=pictures is not None,
+        draw=pictures is not None and diff is None,
+        every_place=base is not None or writes is not None,
     )
     for name in files or ():
         if name.endswith(".toml") and Path(name).is_file():
             expect_none_but("", read_toml(Path(name)), name, "FILE")
-    if not files and manifest is None:
+    if diff is not None and (files or manifest is not None or baseline is not None or writes is not None):
+        raise UnitcadError("--diff compares its two names: leave out other files, --manifest and the baselines")
+    if not files and manifest is None and diff is None:
         raise UnitcadError(
             "FILE...: is required: mesh files, folders or globs, or --manifest; see unitcad check --help"
         )
     for pattern, codes in settings.per_file_ignores.items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
-    draw = None
+    known: baselines.Baseline = {}
+    if base is not None and diff is None and writes is None:
+        if not base.exists():
+            field = "--baseline" if baseline is not None else configuration.name("baseline")
+            raise Refusal(field, base.as_posix(), f"{no_such_file(base)}; --write-baseline {base.as_posix()} writes it")
+        known = baselines.read(base)
+    draw = drawn = None
     if pictures is not None:
         from unitcad.export import finding_pictures  # loads Pillow
 
-        draw = partial(finding_pictures.write, Path(pictures))
+        draw, drawn = (
+            partial(finding_pictures.write, Path(pictures)),
+            partial(finding_pictures.versions, Path(pictures)),
+        )
     memory = memory or settings.memory or 8000
-    check_all = partial(file_checks.check_files, jobs=jobs, memory_mb=memory, then=draw)
+
+    def check_all(work: Sequence[tuple[str, Options]]) -> Iterator[FileReport]:
+        """Yield the reports, and show on a terminal how many there are."""
+        every = file_checks.check_files(work, jobs=jobs, memory_mb=memory, then=draw if diff is None else None)
+        with progress("check") as say:
+            failed = 0
+            for k, one in enumerate(every, 1):
+                failed += bool(failing(one, level))
+                say(f"{k} of {len(work)} files, {failed} with findings that fail; {printable(one.path)}")
+                yield one
+
     left_out = configuration.left_out(exclude or [])
     paths, unread = file_checks.expand(files or [], left_out)
     faults = [
@@ -286,16 +344,27 @@ def check(
         """Return the options without the codes that the settings ignore for a file."""
         return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
 
-    if manifest is None:
+    if diff is not None:
+        from unitcad.meshcheck import compare
+
+        reports = list(compare.compare(compare.pairs(*diff, left_out), of_path, check_all, drawn))
+    elif manifest is None:
         reports = unread + list(check_all([(path, of_path(path)) for path in paths]))
     else:
         listed = listing.read(manifest)
         work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
         compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
         reports = unread + compared + listing.check_unread(listed, [path for path, _ in work], of_path)
+    if writes is not None:
+        known, base = baselines.write(writes, reports), writes
+    if base is not None and diff is None:
+        reports = [baselines.apply(known, base, report) for report in reports]
+    reports = [report.shortened() for report in reports]
+    named = None if base is None or diff is not None else base.as_posix()
     for format_, path in copies:
-        _save(path, render(reports, format_, level, configuration.shown))
-    _write(render(reports, output_format, level, configuration.shown), plain=output_format == "text")
+        _save(path, render(reports, format_, level, configuration.shown, named))
+    written = render(reports, output_format, level, configuration.shown, named, quiet=quiet)
+    _write(written, plain=output_format == "text")
     raise typer.Exit(2 if faults else file_checks.worst(reports, level))
 
 

@@ -117,7 +117,7 @@ class Design:
     opens        side on which motor and circuit go in: "above" or "below" (the skin)
     laid_in      the pour (from 1) before which motor, circuit and printed parts are laid in, to stay; 0: after casting
     caps         whether a layer has a cap over the one inside it, or is an open ring
-    passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
+    passes       how often the wave from motor to skin passes the border between the layers; None: no level at the edge
     assembly     how motor and circuit go into the body, or into the mould, a sentence each; [] for a default
     skipped     skipped pieces of this variant, and why
     default      whether it is the design of new specs; True for one design

@@ -12,11 +12,13 @@ import typer
 from rich.table import Column, Table
 
 from unitcad import files
-from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE, sign_flip_p
+from unitcad.attenuation.edge.models import BASELINE, RULE
 from unitcad.attenuation.edge.ranges import PERCENT, ModelFit, quantiles
-from unitcad.cli.output import console, print_json, progress
+from unitcad.attenuation.edge.scoring import OVERTURNED, sign_flip_p
+from unitcad.cli.output import print_json, progress
 from unitcad.cli.shared_options import AsJson
+from unitcad.cli.tables import console
+from unitcad.documents import rounded
 from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
 from unitcad.spec.convert import without_none

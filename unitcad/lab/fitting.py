@@ -13,15 +13,15 @@ from msgspec import Meta, field
 from scipy.special import stdtrit
 
 from unitcad import files
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, coordinates_of, measured_table, nominal
-from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, SEED, bootstrap_range, leader
+from unitcad.attenuation.edge.models import BASELINE, COMPARED, RULE
 from unitcad.attenuation.edge.ranges import InputFile, LabFit, ModelFit, OwnLevel, unit_key
+from unitcad.attenuation.edge.scoring import SEED, bootstrap_range, leader
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
-from unitcad.documents import read_toml
+from unitcad.documents import read_toml, rounded
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.estimate_inputs import estimate_input
 from unitcad.lab.campaign import File, Name, file_of
@@ -310,6 +310,7 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
                 frequency_hz=variant.frequency.middle, source=unit.source,
                 place=rounded(coordinates_of(built).tolist(), 6),
                 residual=float(f"{np.log(level.value) - predicted:.6g}"),
+                features=sorted({feature.name for feature in built.features}),
             )
         )  # fmt: skip
     fit = LabFit(
@@ -325,10 +326,8 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
 def _at_bound(name: str, campaigns: Campaigns, constants: np.ndarray) -> str | None:
     """Return a constant of a model that the units do not determine, None if they determine all.
 
-    None of the units reads it, all read it alike with another constant, or the search met its bound.
+    None of the units reads it, or all read it alike with another constant.
     """
-    if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
-        return "kappa"
     read = gradients(COMPARED[name], campaigns.table, constants)
     unread = ~read.any(axis=0)
     if name == BASELINE or (not unread.any() and np.linalg.matrix_rank(read) == read.shape[1]):
@@ -361,12 +360,12 @@ def _entry(
     paper = ~campaigns.own
     constants = {"constants": found.constants, "low": found.constants / wide, "high": found.constants * wide}
     constants["stored"] = model.fit(campaigns.table, paper[None].astype(float))[0] if paper.any() else ()
-    low, high = bootstrap_range(np.abs(judged.errors))
+    resampled = bootstrap_range(np.abs(judged.errors))
     against, error, p = paired_difference(judged, all_judged[BASELINE]) if name != BASELINE else (None, None, None)
     numbers = {
         **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
         "model_error": found.sigma, "covariance": found.covariance.tolist(), "leave_one_out": judged.score,
-        "leave_one_out_low": low, "leave_one_out_high": high, "own_leave_one_out": judged.own_score,
+        "leave_one_out_low": resampled.low, "leave_one_out_high": resampled.high, "own_leave_one_out": judged.own_score,
         "own_by_stored": judged.stored_score, "against_baseline": against, "against_baseline_error": error,
         "against_baseline_p": p,
     }  # fmt: skip

@@ -14,14 +14,13 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta, Struct
 
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
 from unitcad.catalogue import entries as kinds
 from unitcad.catalogue.entries import between
 from unitcad.designs import layer_colour
-from unitcad.documents import parse_toml
+from unitcad.documents import parse_toml, rounded
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import tissue_layer
 from unitcad.kernels.mesh import bounds, realise

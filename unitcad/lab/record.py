@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.estimates import rounded
+from unitcad.documents import rounded
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats

@@ -18,7 +18,8 @@ import numpy as np
 from scipy.special import stdtr
 
 from unitcad.attenuation.edge.measured import MeasuredTable
-from unitcad.attenuation.edge.models import Model, sign_flip_p
+from unitcad.attenuation.edge.models import Model
+from unitcad.attenuation.edge.scoring import sign_flip_p
 
 BETWEEN_LABS = 1.0
 """Assumed: another phantom, motor and axis shift a model as much as one unit scatters."""

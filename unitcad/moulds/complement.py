@@ -42,8 +42,9 @@ from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
 from unitcad.moulds.layout import Frame
 from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, lid_piece
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
-from unitcad.shape.profile import GRID_PER_MM
+from unitcad.shape.profile import FACETS, GRID_PER_MM
 from unitcad.spec import Spec
+from unitcad.spec.custom_code import is_body_file
 
 LEAST_AREA = 2.0
 """Of an opening that silicone is poured or injected into, mm2 (assumed): a thread or a needle of 1.6 mm."""
@@ -83,7 +84,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     def there(layer: int) -> Sequence[Shape]:
         return laid if layer + 1 >= laid_in else ()
 
-    injected = spec.moulds.pour == "injected"
+    injected, least = spec.moulds.pour == "injected", films(spec)
     standing, hung, tops = _carried(spec, cast, there, solids, rims, max(radii), segments)
     for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)):
         _check_opening(spec, i, solid, rim)
@@ -120,11 +121,11 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         grooved.append(bool(overflow))
         bores, holes = in_cells([under]), in_cells(slid)
         cup = cut(blank, [recess(frame), *bores, *holes, *overflow])
-        parted = _pieces(realise(cup, segments))
+        parted = _pieces(realise(cup, segments), least)
         if len(parted) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
             elsewhere = [realise(shape, segments) for shape in (cup, base, *in_cells(hung[i]))]
-            for lost in _pieces(Manifold.batch_boolean([Manifold.compose(parted), *elsewhere], OpType.Subtract)):
+            for lost in _pieces(Manifold.batch_boolean([Manifold.compose(parted), *elsewhere], OpType.Subtract), least):
                 raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
         cups.append(cup)
         # Down into the plinth too: faces that only touch could leave a passage of no width.
@@ -158,14 +159,18 @@ def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tupl
 
 
 def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
-    """Raise Refusal if a layer's opening at its rim is too small to pour silicone through."""
+    """Raise Refusal if a layer's opening at its rim is too small to pour silicone through, or for the vents of a lid."""
+    injected = spec.moulds.pour == "injected"
     width, area = max(regions(solid, rim), default=(0.0, 0.0))
-    if area >= LEAST_AREA and width >= LEAST_WIDTH:
+    wide = lid.LEAST_VENT if injected else LEAST_WIDTH
+    if area >= LEAST_AREA and width >= wide:
         return
     corners = arrays(solid)[0]
     x, y, z = corners[corners[:, 2].argmax()]
     opening = f"an opening of {area:.2g} mm2 in the rim that takes a circle of {width:.2g} mm"
-    least = f"to pour silicone takes {LEAST_AREA:g} mm2 and a circle of {LEAST_WIDTH:g} mm"
+    least = (
+        f"{'a lid with vents' if injected else 'to pour silicone'} takes {LEAST_AREA:g} mm2 and a circle of {wide:g} mm"
+    )
     why = f"the layer's top, at x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm, leaves {opening}; {least}: "
     raise _refused(spec, layer, f"{why}give it a flat top, such as a disc of {FLAT:g} mm, or turn it over")
 
@@ -184,8 +189,9 @@ def _carried(
     Raises Refusal for a piece that would hang in the air, and for one in the place of a later layer.
     """
     filled = (*cast, *there(len(cast) - 1))
-    under = _without_films(Cut(Below(union(filled), 0.0), filled), segments)
-    held = _pieces(realise(under, segments))
+    least = films(spec)
+    under = _without_films(Cut(Below(union(filled), 0.0), filled), segments, least)
+    held = _pieces(realise(under, segments), least)
     for piece in held:
         if not _stands(piece):
             raise _refused(spec, len(cast) - 1, f"a hollow of {_place(piece)} is closed in by silicone below and above")
@@ -197,7 +203,7 @@ def _carried(
             raise _refused(spec, i, f"an insert reaches above the rim at z = {rim:.4g} mm")
         beneath = Below(union((*cast[: i + 1], *there(i))), -BEYOND)
         beside = Cut(box(-edge, edge, -edge, edge, -BEYOND, rim), (beneath,))
-        for piece in _pieces(realise(beside, segments)):
+        for piece in _pieces(realise(beside, segments), least):
             if bounds(piece)[3] > edge - LEVEL:
                 continue
             if not _stands(piece):
@@ -212,21 +218,29 @@ def _carried(
             if i == len(rims) - 1:
                 held.append(above)
                 standing.append(Component(beside, _inside(piece)))
-            elif thick_pieces(above - Manifold.compose(held)):
+            elif thick_pieces(above - Manifold.compose(held), least):
                 why = f"a loose piece of {_place(above)} is in layer {i + 1}, and a later layer takes its place"
                 raise _refused(spec, i, why)
         needed = realise(Cut(Below(union(cast[: i + 1]), 0.0), tuple(cast[: i + 1])), segments)
         for j in range(i + 1, len(cast)):
             lost = needed ^ solids[j]
-            if thick_pieces(lost):
+            if thick_pieces(lost, least):
                 why = f"layer {j + 1} is under layer {i + 1} in a space of {_place(lost)}, in the place of its core"
                 raise _refused(spec, i, why)
     return standing, hung, max([bounds(piece)[5] for piece in held], default=LEVEL)
 
 
-def _pieces(solid: Manifold) -> list[Manifold]:
-    """Return the connected pieces, lowest first, without scraps of facets and rounding."""
-    return sorted(thick_pieces(solid), key=bounds)
+def films(spec: Spec) -> float:
+    """Return the thickness up to which a piece is a film of facets or rounding, mm.
+
+    In a body from a file, facets on either side of a film are each off the surface that was meant, and on the grid.
+    """
+    return 2 * (FACETS + LEVEL) if is_body_file(spec.design) else FACETS
+
+
+def _pieces(solid: Manifold, least: float) -> list[Manifold]:
+    """Return the connected pieces, lowest first, without films up to `least` (mm) of facets and rounding."""
+    return sorted(thick_pieces(solid, least), key=bounds)
 
 
 def _stands(piece: Manifold) -> bool:
@@ -234,21 +248,21 @@ def _stands(piece: Manifold) -> bool:
     return bool(thick_parts(piece.slice(LEVEL / 2)))
 
 
-def _without_films(shape: Shape, segments: int) -> Shape:
+def _without_films(shape: Shape, segments: int, least: float) -> Shape:
     """Return a shape whose pieces have no films, which rounding leaves upright between two faces in one plane.
 
     A film has area and no volume, and faces nowhere upwards: none is under the upward faces.
     """
-    kept = _pieces(realise(shape, segments))
+    kept = _pieces(realise(shape, segments), least)
     if not kept:
         return shape
     whole = Manifold.compose(kept)
     low, area = bounds(whole)[2], whole.surface_area()
-    cleared, least = shape, area - FILM
+    cleared, smallest = shape, area - FILM
     for other in (Below(shape, low), Common((shape, Below(shape, low - BEYOND)))):
         solid = realise(other, segments)
-        if solid.surface_area() < least and abs(solid.volume() - whole.volume()) < LEVEL**2 * area:
-            cleared, least = other, solid.surface_area()
+        if solid.surface_area() < smallest and abs(solid.volume() - whole.volume()) < LEVEL**2 * area:
+            cleared, smallest = other, solid.surface_area()
     return cleared
 
 
@@ -282,7 +296,7 @@ def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float,
         hole = _grown(under, clearance, corners)
     if rim - spec.moulds.least_wall_mm < top < rim:
         column = _grown(Below(moved(piece, z=rim), -2 * BEYOND), clearance, corners)
-        if len(_pieces(wall - realise(column, segments))) <= len(_pieces(wall)):
+        if len(_pieces(wall - realise(column, segments), FACETS)) <= len(_pieces(wall, FACETS)):
             return column
     return hole
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
-from unitcad.designs.design import BEYOND, Cell, Layout, Tooling
+from unitcad.designs.design import BEYOND, Cell, Fitting, Layout, Tooling
 from unitcad.designs.dimensions import tool_dimensions
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import filament, lid
@@ -50,7 +50,9 @@ class Step:
     `inserts` are motor and circuit of all cells, if they are laid in before this pour or an earlier one. `rim` is z of
     the plane that the blade runs on, `top` that of the silicone's open surface: the rim or the lid's upper face.
     `windows` counts the cup's passages for tongues that are closed all round; `groove`: it has an overflow groove.
-    `pins` centre the pour's lid on its base, if no cup does.
+    `pins` centre the pour's lid on its base, if no cup does. `greased`: the faces that get petroleum jelly before the
+    cup is put on, "" for none; a seal next to a tongue's passage is greased with the tongue.
+    `solids`: the number of solids that the product's body of this layer has.
     `removals` are the pieces taken away once the layer has cured, in that order; the others are part of the next pour.
     """
 
@@ -69,6 +71,8 @@ class Step:
     inserts: tuple[Body, ...] = ()
     pins: Pins | None = None
     removals: tuple[Removal, ...] = ()
+    greased: str = ""
+    solids: int = 1
 
     def __repr__(self) -> str:
         return f"Step({self.index}: {self.name}, {self.material or 'no material'}; {', '.join(self.tools)})"
@@ -94,6 +98,9 @@ class Plan:
     the through holes of a tool, by its name, if dimensions of rings don't define them.
     `stretches`: parts of the silicone that stretch after casting, and by how many percent, besides those of the tools.
     `splits`: the tools that are printed in pieces; everything but the pieces' files and C250 sees them joined.
+    The product: `makes` is its name. `laid_later` goes into the silicone after casting, `pushed_in` into a cast sheet
+    from its side towards the skin, each body named after its place. `assembly` says how; None: as the design does.
+    `widest`: name and width (mm) of the widest open surface of a pour; None: the unit. `across`: the length to measure.
     """
 
     tools: tuple[Body, ...]
@@ -107,6 +114,12 @@ class Plan:
     pry_slots: tuple[tuple[int, str, float], ...] = ()
     genus: tuple[tuple[str, int], ...] = ()
     splits: tuple[Split, ...] = ()
+    makes: str = "unit"
+    laid_later: tuple[Body, ...] = ()
+    pushed_in: tuple[Body, ...] = ()
+    assembly: tuple[Fitting, ...] | None = None
+    widest: tuple[str, float] | None = None
+    across: str = ""
 
     def __repr__(self) -> str:
         pours = f"{len(self.steps)} {'pour' if len(self.steps) == 1 else 'pours'}"
@@ -187,10 +200,18 @@ def plan(spec: Spec) -> Plan:
             groove=made.grooves[i] if made.grooves else True,
             inserts=laid if i + 1 >= laid_in else (),
             removals=tuple(customary(standing[i], last=i + 1 == len(layers))),
+            greased=_greased(i + 1) if made.seals[i] and not made.concentric else "",
         )
         for i, layer in enumerate(spec.layers)
     )
-    return Plan(tools, steps, lay, label, dims, made.concentric)
+    across = f"Farthest corner from the axis: {dims.outer_radius:.2f} mm."
+    return Plan(tools, steps, lay, label, dims, made.concentric, across=across)
+
+
+def _greased(pour: int) -> str:
+    """Return the faces to grease before the cup of a pour by complement is put on."""
+    parts = f"the upright faces of the parts on the base, only inside the slots of cup {pour} for them"
+    return f"{parts}, outside the cavity"
 
 
 def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:

@@ -16,8 +16,7 @@ from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
 from unitcad.documents import read_json
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.write import BENCH
+from unitcad.pipeline.manifest import BENCH, Manifest
 from unitcad.report.html_page import html_page
 from unitcad.report.read_results import expect, spec_in, step_pictures
 from unitcad.spec import Spec, spec_hash, to_data

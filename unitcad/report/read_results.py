@@ -22,9 +22,8 @@ from unitcad.documents import read_json, read_toml
 from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.files import TEMPORARY
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.manifest import PAGE, Manifest, level_columns
 from unitcad.pipeline.plan import GEOMETRIC, build_key
-from unitcad.pipeline.write import PAGE
 from unitcad.report.html_page import REFERENCE
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, to_data, with_formats
@@ -43,13 +42,12 @@ class ListedVariant(Struct):
 
 
 class SweptLevels(Struct):
-    """Each model's typical error in a batch, a factor, and the swept keys that it does not read.
+    """The swept keys that the level at the edge does not read.
 
-    `not_measured`: swept lengths with the one value, mm, that every measured unit had; earlier batches have none.
+    `not_measured`: swept lengths with the one value, mm, that every measured unit had.
     """
 
-    typical_error: dict[str, float]
-    insensitive: dict[str, list[str]]
+    unread: list[str]
     not_measured: dict[str, float] = {}
 
 
@@ -318,8 +316,7 @@ def _row(record: VariantRecord) -> dict[str, Any]:
     for i, layer in enumerate(spec.get("layers", [])):
         row |= {f"layers.{i}.{key}": value for key, value in layer.items()}
     row |= {f"{part['name']}_mm3": part["volume_mm3"] for part in manifest["parts"] if part["made"] == "cast"}
-    for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
-        row[f"edge_{model}"] = level["edge"]
+    row |= level_columns(manifest["estimate"])
     checks = manifest["mould_checks"]
     row["mould_checks"] = ("hold" if all(check["ok"] for check in checks) else "broken") if checks else None
     row["warnings"] = len(manifest["warnings"])

@@ -31,9 +31,10 @@ from unitcad.catalogue.entries import between
 from unitcad.documents import parse_json
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.files import names_device, read_text
-from unitcad.pipeline.subjects import subject_of_data
+from unitcad.pipeline.subject import Subject
+from unitcad.pipeline.subjects import compound, subject_of_data
 from unitcad.rooms import load
-from unitcad.spec import check_plain, convert
+from unitcad.spec import Spec, check_plain, convert
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 from unitcad.spec.paths import in_words, meant, paths_of
 from unitcad.spec.raw import RawSpec
@@ -264,16 +265,20 @@ class Sweep:
             chosen[path] = values[here]
         return list(self.bases)[base], {path: chosen[path] for path in self.axes}
 
-    def spec(self, index: int) -> Any:
-        """Return the resolved spec, or the array, of variant `index`. Raises Refusal."""
-        return subject_of_data(self.data(index)).of
+    def subject(self, index: int) -> Subject:
+        """Return variant `index`, a unit or an array of units, everything settled. Raises Refusal."""
+        return subject_of_data(self.data(index))
+
+    def spec(self, index: int) -> Spec:
+        """Return the resolved spec of variant `index`, of an array its unit's. Raises Refusal."""
+        return self.subject(index).unit
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return the faults of a refused variant in one line; `first` is its refusal."""
         kind = compound_kind(self.data(index))
         if isinstance(first, Refusal) and kind:
             if index < EXPLAINED:
-                return str(load(kind.subject).offered(first, self.data(index)))
+                return str(compound(kind).offered(first, self.data(index)))
             return str(Refusal(first.field, first.value, first.limit))  # without an offer, which nobody tried
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
@@ -376,7 +381,7 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
     place = folder / base if is_path(base) else base
     confirm_known(base, "base", Refusal)
     kind = compound_kind(place)
-    data = load(kind.subject).read(every_template().get(base) or Path(place)) if kind else read(place)
+    data = compound(kind).read(every_template().get(base) or Path(place)) if kind else read(place)
     check_plain(data)
     return data
 

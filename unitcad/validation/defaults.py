@@ -233,19 +233,9 @@ GRAVITY, MOTOR_G_CM3 = 9.80665, 5.0
 """Density of a motor whose mass no one states (assumed: coin motors have 4 to 6.5)."""
 
 
-def warnings(spec: Spec, estimate: bool = True) -> list[str]:
-    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's.
-
-    Without `estimate` those are left out that concern only the estimate.
-    """
+def warnings(spec: Spec) -> list[str]:
+    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
     design, found = design_of(spec), [*_thin_layers(spec), *_bonds(spec), *_leads(spec), *_roof(spec)]
-    if estimate:
-        unmeasured = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
-        found += [
-            f"{key} = {mm:g} mm: no measured unit has {what}; the estimate is that of the unit without it"
-            for key, (what, mm) in unmeasured.items()
-            if mm
-        ]
     low, high = CIRCUIT_STOCK
     if spec.fpcb and not low <= spec.fpcb.thickness_mm <= high:
         stock = f"flexible circuits are {low:g} to {high:g} mm thick"
