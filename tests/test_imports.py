@@ -23,7 +23,7 @@ from unitcad.validation import default_template, templates
 
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
-    {"accuracy", "arrays", "lab", "search", "serve", "sweeps"},
+    {"accuracy", "arrays", "bodies", "lab", "search", "serve", "sweeps"},
     {"cli"},
     {"api"},
     {"report"},
