@@ -21,7 +21,7 @@ from unitcad.designs.design import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.kernels.mesh import arrays, bounds, realise, segment_count, thick_pieces
 from unitcad.moulds.complement import films
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.mould_set import MouldSet, origin_of
 from unitcad.moulds.plan import Plan
 from unitcad.shape import Shape
 from unitcad.spec import Spec
@@ -104,7 +104,7 @@ def _drawn(spec: Spec, body: Shape) -> Iterator[tuple[Way, Mould | str]]:
 
 def _failed(spec: Spec, plan: Plan) -> list[MouldFinding]:
     """Return the findings against a plan: of the checks of geometry, since variants in silicone share their tools."""
-    moulds = MouldSet(spec, plan)
+    moulds = MouldSet(spec, origin=replace(origin_of(spec), plan=lambda: plan))
     wide = (at_most("C310", strain.where, strain.percent, MOST_STRETCHED, "%") for strain in strains(moulds))
     return [finding for finding in (*check_geometry(moulds), *wide) if not finding.ok]
 
