@@ -35,8 +35,9 @@ from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.paths import EXACT, in_words, meant
 from unitcad.spec.raw import RawSpec
-from unitcad.spec.toml import line_of, text_of
+from unitcad.spec.toml import text_of
 from unitcad.text import join_words
+from unitcad.toml_text import line_of
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.load import named_file, override, shipped_files
 from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, put

@@ -31,7 +31,8 @@ from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.raw import Table
-from unitcad.spec.toml import from_json, line_of, to_json
+from unitcad.spec.toml import from_json, to_json
+from unitcad.toml_text import line_of
 from unitcad.validation import templates
 from unitcad.validation.plain_data import at
 from unitcad.validation.suggestions import every_fault

@@ -93,10 +93,10 @@ def _compared(old: FileReport, new: FileReport, same: bool, options: Options, dr
         clock = Deadline(options.limits.seconds)
         surfaces = [surface_of(Path(report.path), options, clock) for report in (old, new)]
         if all(len(surface) for surface in surfaces):
-            farthest = largest_distance(*surfaces, clock.tick)
+            farthest = largest_distance(surfaces[0], surfaces[1], clock.tick)
             change = replace(change, distance_mm=farthest.distance, error_mm=farthest.error)
             if draw is not None:
-                draw(new.path, *surfaces)
+                draw(new.path, surfaces[0], surfaces[1])
     except Unreadable:  # which the reports say
         pass
     return replace(marked, change=change)

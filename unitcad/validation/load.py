@@ -19,7 +19,7 @@ from unitcad.rooms import load as load_reference
 from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
 from unitcad.spec.custom_code import is_body_file, is_custom, with_source
 from unitcad.spec.raw import RawSpec
-from unitcad.spec.toml import line_of
+from unitcad.toml_text import line_of
 from unitcad.validation.defaults import resolve
 from unitcad.validation.plain_data import ABSENT, Changes, Source, at, changes_of, plain, put, requested_data
 from unitcad.validation.suggestions import every_fault, suggest
