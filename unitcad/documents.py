@@ -7,6 +7,7 @@ lists, texts, numbers, dates and None, at most `DEEPEST` deep. `expect_bounded` 
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import tomllib
@@ -15,15 +16,12 @@ from functools import lru_cache
 from itertools import islice
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import msgspec
-
-from unitcad.errors import Refusal, UnitcadError, misfit
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import LARGEST, read, read_text
 from unitcad.text import printable
 
-T = TypeVar("T")
 DEEPEST = 20
 """Tables and lists in each other that data may have: more than any spec, sweep or result needs."""
 MOST = 20_000
@@ -56,8 +54,8 @@ def expect_bounded(data: Any, field: str = "", most: int = MOST) -> None:
 
     def look(node: Any, path: str, depth: int) -> None:
         nonlocal left
-        if isinstance(node, msgspec.Struct):
-            node = {name: getattr(node, name) for name in node.__struct_fields__}
+        if fields := getattr(node, "__struct_fields__", ()):  # a spec that Python code made
+            node = {name: getattr(node, name) for name in fields}
         left -= len(node)
         if left < 0:
             raise Refusal(path or field, None, f"has more than {most:,} keys, tables and list entries")
@@ -75,16 +73,20 @@ def expect_bounded(data: Any, field: str = "", most: int = MOST) -> None:
             elif isinstance(value, int):
                 if not -LARGEST_INT <= value <= LARGEST_INT:
                     raise Refusal(_below(path, key), value, "is too large for a number here")
-            elif isinstance(value, Mapping | list | tuple | msgspec.Struct):
+            elif _holds(value):
                 below = _below(path, key)
                 if depth == DEEPEST:
                     raise Refusal(".".join(below.split(".")[:3]), "...", f"nests more than {DEEPEST} tables deep")
                 look(value, below, depth + 1)
 
-    if isinstance(data, Mapping | list | tuple | msgspec.Struct):
+    if _holds(data):
         look(data, field, 0)
     else:
         look({field: data}, "", 0)
+
+
+def _holds(value: object) -> bool:
+    return isinstance(value, Mapping | list | tuple) or hasattr(value, "__struct_fields__")
 
 
 def _below(path: str, key: object) -> str:
@@ -270,108 +272,28 @@ def parse_json(content: bytes | str, name: str, *, largest: int = LARGEST) -> An
     if tables > max(MOST, largest // _BYTES_A_TABLE):
         raise UnitcadError(f"{name}: has more than {largest // _BYTES_A_TABLE:,} tables and lists")
     try:
-        data = msgspec.json.decode(content)
+        data = json.loads(content.decode(), parse_constant=_finite, parse_float=_finite)
+        if _SURROGATE.search(content):
+            json.dumps(data, ensure_ascii=False).encode()  # half of a pair is no text
         expect_bounded(data, most=len(content))
     except UnicodeDecodeError as error:
         raise UnitcadError(f"{name}: not UTF-8 (byte {error.start})") from None
+    except UnicodeEncodeError:
+        raise UnitcadError(f"{name}: not JSON: it has half of a surrogate pair") from None
     except RecursionError:
         raise UnitcadError(f"{name}: not JSON: nests too deeply") from None
-    except (msgspec.DecodeError, ValueError) as error:
-        raise UnitcadError(f"{name}: not JSON: {_why(error)}") from None
     except Refusal as refusal:
         raise UnitcadError(f"{name}: {refusal}") from None
+    except ValueError as error:
+        why = "a number has thousands of digits" if "integer string" in str(error) else str(error)
+        raise UnitcadError(f"{name}: not JSON: {why}") from None
     return data
 
 
-def parse_message(content: bytes | str, kind: type[T], name: str = "the message") -> T:
-    """Return JSON as a `kind`. Raises UnitcadError for JSON that `parse_json` refuses, or of another kind."""
-    data = parse_json(content, name)
-    try:
-        return msgspec.convert(data, kind)
-    except msgspec.ValidationError as error:
-        raise UnitcadError(f"{name}: {misfit(error)}: {_why(error)}") from None
+_SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
-def _why(error: Exception) -> str:
-    """Return msgspec's reason as the end of a sentence."""
-    text = str(error).removeprefix("JSON is malformed: ").replace("Input data was truncated", "it ends too early")
-    return text[:1].lower() + text[1:]
-
-
-_FAST = msgspec.json.Encoder()
-_PACKED = msgspec.msgpack.Encoder()
-_MAY_BE_INFINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]", re.DOTALL)
-"""How MessagePack begins a double whose exponent is all ones; other bytes may look so too."""
-
-
-def json_bytes(data: Mapping[str, Any]) -> bytes:
-    """Return JSON with a line a key, and a line an entry of a list or table.
-
-    Raises ValueError for a number that is not finite.
-    """
-    lines, line = [], _FAST.encode
-    for key, value in data.items():
-        if isinstance(value, list) and value:
-            text = b"[\n  " + b",\n  ".join([line(one) for one in value]) + b"\n ]"
-        elif isinstance(value, dict) and value:
-            text = b"{\n  " + b",\n  ".join([line(k) + b": " + line(v) for k, v in value.items()]) + b"\n }"
-        else:
-            text = line(value)
-        if b"null" in text and not all_finite(value):  # msgspec writes what is not finite as null
-            raise ValueError(f"a number that is not finite in {key}: {value!r:.200}")
-        lines.append(b" " + line(key) + b": " + text)
-    return b"{\n" + b",\n".join(lines) + b"\n}\n"
-
-
-def rounded_json(data: Any) -> str:
-    """Return JSON on indented lines, numbers to nine significant digits. Raises ValueError as `json_bytes`."""
-    if not all_finite(data):  # msgspec writes numbers that are not finite as null
-        raise ValueError("a number is not finite")
-    rounded = _NINE_DIGITS.decode(msgspec.json.encode(data))
-    return msgspec.json.format(msgspec.json.encode(rounded), indent=1).decode() + "\n"
-
-
-def _nine_digits(text: str) -> float:
-    """Return a number to nine significant digits; with its point or exponent a short text has no more."""
-    return float(text) if len(text) <= 10 else float(f"{float(text):.9g}")
-
-
-_NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
-
-
-def all_finite(value: Any) -> bool:
-    """Tell whether every number in lists and dicts is finite."""
-    try:
-        if not _MAY_BE_INFINITE.search(_PACKED.encode(value)):  # a tenth of the time of the walk
-            return True
-    except OverflowError:  # MessagePack has no whole numbers beyond 64 bits
-        pass
-    left = [value]
-    while left:
-        one = left.pop()
-        if isinstance(one, dict):
-            left.extend(one.values())
-        elif isinstance(one, (list, tuple)):
-            left.extend(one)
-        elif isinstance(one, float) and one - one != 0.0:
-            return False
-    return True
-
-
-SIGNIFICANT_DIGITS = 9
-
-
-def rounded(data: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
-    """Return `data` with its floats to `digits` significant digits, and None for floats that are not finite.
-
-    So the last bits of a platform do not show.
-    """
-    if isinstance(data, str):  # the most frequent
-        return data
-    if isinstance(data, float):
-        return float(f"{data:.{digits}g}") if isfinite(data) else None
-    if isinstance(data, dict):
-        return {key: rounded(value, digits) for key, value in data.items()}
-    if isinstance(data, (list, tuple)):  # a union would be made anew at each call
-        return [rounded(value, digits) for value in data]
-    return data
+def _finite(text: str) -> float:
+    if not isfinite(value := float(text)):
+        raise ValueError(f"{text[:30]} is not a finite number")
+    return value

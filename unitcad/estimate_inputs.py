@@ -29,8 +29,8 @@ from unitcad.attenuation.inputs import (
 from unitcad.attenuation.layered import FractionalKelvinVoigt, UniformDisc
 from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, measurements, motors, tissue
 from unitcad.designs import design_of, dimensions
-from unitcad.documents import rounded
 from unitcad.errors import Refusal
+from unitcad.json_text import rounded
 from unitcad.spec import Spec
 from unitcad.spec.custom_code import is_custom
 from unitcad.validation.defaults import lab_fit

@@ -1,7 +1,7 @@
 """The rooms: packages of unitcad that the core works without.
 
 The core names no room. A room states its additions in its `room.toml`: the functions of its commands as "module:name",
-and the kinds of TOML files that it knows.
+the kinds of TOML files that it knows, and a function that makes moulds (`moulds.plan`).
 """
 
 from __future__ import annotations
@@ -89,6 +89,12 @@ def commands() -> dict[str, Command]:
 def file_kinds() -> tuple[FileKind, ...]:
     """Return the kinds of TOML files."""
     return tuple(FileKind(**_with_tuples(table)) for room in _rooms() for table in room.get("files", ()))
+
+
+@cache
+def mould_makers() -> tuple[str, ...]:
+    """Return "module:name" of each room's function that makes moulds for a body by more ways than the core's."""
+    return tuple(room["moulds"] for room in _rooms() if "moulds" in room)
 
 
 def kind_of(data: Mapping[str, object]) -> FileKind | None:

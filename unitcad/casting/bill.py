@@ -151,7 +151,7 @@ def list_consumables(
         note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide"
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
     named = {"caliper", *(tool for step in steps for tool in step.required_tools)}
-    lidded = [batch for batch in batches if batch.step.lid]
+    lidded = [batch for batch in batches if batch.step.injected]
     strips = 2 * (len(tape_places(moulds)) if cups else 0) * sum(not step.lid for step in moulds.plan.steps)
     if strips:
         named.discard("adhesive tape")  # its strips are on the list

@@ -130,12 +130,12 @@ def pot_life(material: Material, room_c: float) -> float | None:
     return at_room(float(material.pot_life_min), room_c) if material.pot_life_min else None
 
 
-def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
+def mix(spec: Spec, material: Material, volume_mm3: float, *, injected: bool) -> Mix:
     """Return the weights for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
     casting, ratio = spec.casting, float(for_casting(material, "mix_ratio"))
     net = volume_mm3 * float(material.density_g_cm3) / 1000
     density = float(material.density_g_cm3)
-    syringe = net / density + HELD_BACK_ML if spec.moulds.pour == "injected" else 0.0
+    syringe = net / density + HELD_BACK_ML if injected else 0.0
     # The waste remains in the mixing cup; the rest in the syringe comes on top.
     total = max(net * (1 + casting.waste) + (HELD_BACK_ML * density if syringe else 0.0), casting.minimum_mix_g)
     share = ratio / (1 + ratio)
@@ -218,7 +218,7 @@ class Batch:
     def mix(self) -> Mix:
         """Weights for all cavities and channels."""
         poured = self.volume_mm3 * len(self.step.layer) / self.step.solids
-        return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3)
+        return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3, injected=self.step.injected)
 
     @property
     def channels_mm3(self) -> float:
@@ -260,7 +260,7 @@ class Batch:
         """
         if self.pot_min is None:
             return 0.0
-        allowed, injected = WITHOUT_VACUUM * self.pot_min, self.moulds.spec.moulds.pour == "injected"
+        allowed, injected = WITHOUT_VACUUM * self.pot_min, self.step.injected
         rise = math.inf if self.rise_min is None else self.rise_min
         return min(rise, allowed) if injected or rise <= allowed else 0.0
 
@@ -284,7 +284,6 @@ class Batch:
     @property
     def verdict(self) -> str:
         """How bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
-        lid = self.step.lid
         if self.vacuum:
             said = (
                 f"Degas for {number(DEGASSING_MIN, 3)} min at {number(VACUUM_INHG, 3)} inHg: it foams up and falls "
@@ -292,11 +291,11 @@ class Batch:
             )
         else:
             rise, pot = self.rise_min, self.pot_min
-            where = "stand the syringe up, its tip up," if lid else "leave the mould alone"
+            where = "stand the syringe up, its tip up," if self.step.injected else "leave the mould alone"
             brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
             wait = "a quarter of the pot life" if pot is None else f"{number(WITHOUT_VACUUM * pot, 2)} min"
             stand = f"{where} for {wait}, push out the air, and inject slowly"
-            way_out = f"get a vacuum, or {stand if lid else brush}"
+            way_out = f"get a vacuum, or {stand if self.step.injected else brush}"
             if rise is None or pot is None:
                 lacks = join_words(self.unknown)
                 said = f"No vacuum, and no source gives the {lacks}, so bubbles may stay: {way_out}."
@@ -411,6 +410,8 @@ def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
 
     They are those of the cured unit: silicone shrinks from the tools' lengths.
     """
+    if moulds.plan.way:
+        return []  # the body may stand on its side
     dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
     seat = -moulds.plate[0]
     below = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)

@@ -154,7 +154,7 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
         yield _cup_held(moulds, n, picture("hold"))
     if dry:
         yield from mixing_steps(batch)
-    if step.lid:
+    if step.injected:
         yield from injection_steps(batch, picture("inject"))
     else:
         if cells == 1 or len(step.layer) > 1:
@@ -184,7 +184,7 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
             ("stiff card or plastic",) if strip else (),
         )
     touched = (
-        "the bead on a vent" if step.lid else f"the silicone in {groove}" if step.groove else "what was struck off"
+        "the bead on a vent" if step.injected else f"the silicone in {groove}" if step.groove else "what was struck off"
     )
     yield cure(batch, touched, "layer", picture("filled"))
     if tongues:
@@ -219,13 +219,14 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
             "little."
         )
     back = "from the skin's side" if step is plan.steps[-1] else "and put it back"
+    trimmed = " Sprue and vents tear off: trim them flush with a knife." if step.gated else ""
     yield BenchStep(
         f"Cup {n} off",
         f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. Layer {n} should stay on "
-        f"the {holds(moulds)}: if it comes off in the cup, push it out {back}.",
+        f"the {holds(moulds)}: if it comes off in the cup, push it out {back}.{trimmed}",
         picture("cup-off"),
         minutes=LIFT_MIN,
-        required_tools=("blunt spatula",) if split else (),
+        required_tools=("blunt spatula",) if split else ("sharp knife",) if step.gated else (),
     )
 
 
@@ -411,7 +412,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
             minutes=LIFT_MIN * 2,
             required_tools=("blunt spatula",) if split else (),
         )
-    film = " and the blade's film" if moulds.spec.moulds.pour == "open" else ""
+    film = "" if last.injected else " and the blade's film"
     title, what, out, path = (
         "Peel off",
         "unit's edge",
@@ -549,7 +550,7 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
     """
     spec, dims, off, exit = moulds.spec, moulds.dimensions, eccentricity(moulds), moulds.dimensions.exit
     layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
-    drawn = dims.heights[-1]
+    drawn = dims.heights[-1] if moulds.plan.concentric else moulds.height
     high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)
     by_layers = f" ({shown(drawn, 2)} drawn, {layers})" if high != drawn else ""
     over = f", with the skin {shown(high + dims.skin, 2)} mm" if dims.skin else ""
@@ -569,7 +570,7 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
         size = f"{shown(exit.width, 2)} wide, {shown(exit.height, 2)} high"
         yield f"The {opening}: {size}, open all the way."
     weights = " + ".join(shown(each) for each in masses_g) + (f" = {shown(sum(masses_g))}" if len(masses_g) > 1 else "")
-    low = "" if spec.moulds.pour == "injected" else " or a low strike"
+    low = "" if moulds.plan.steps[-1].injected else " or a low strike"
     motor = "motor" if moulds.plan.makes == "unit" else "motors"
     without = "" if spec.motor.absent else f", without {motor} and circuit"
     closed = f", with the skin {shown(sum(masses_g) + skin_g)} g" if skin_g else ""

@@ -241,7 +241,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     # The first whose rim takes a level: nothing on the base is higher.
     cup = spaced(next((step for step in plan.steps if step.rim >= core - 1e-9), plan.steps[-1]).cup)
     enough, tool = fall(moulds)
-    if lengths.pour == "injected":
+    if plan.steps[-1].injected:
         enough, tool = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents.", "level"
     yield level(
         f"Put the base in its final place, {cup} on it. Lay a level on the rim, along and across, and shim the base's "

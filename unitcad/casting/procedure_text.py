@@ -15,8 +15,8 @@ from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep, Phase, duration, number_steps
 from unitcad.casting.troubles import TROUBLES, troubles_markdown
-from unitcad.documents import rounded_json
 from unitcad.export import svg
+from unitcad.json_text import rounded_json
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.tree import Body

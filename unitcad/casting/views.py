@@ -47,6 +47,7 @@ from unitcad.moulds.lid import films
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step, place_in_cell
+from unitcad.rooms import load
 from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
@@ -115,6 +116,8 @@ def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
                 box = bounds(moulds.mesh_of(shape)) if view.group == "curved" else extent(shape)
                 moving.setdefault(item.moved, []).append(box)
     for (dx, dy, dz), boxes in moving.items():
+        if not (dx or dz):
+            continue  # it would point at the eye
         (x0, y0, z0), (x1, _, z1) = np.min(boxes, axis=0)[:3].tolist(), np.max(boxes, axis=0)[3:].tolist()
         x, z = (x0 + x1 + dx) / 2, (z0 + z1 + dz) / 2
         if not dz:
@@ -154,9 +157,12 @@ def _views(moulds: MouldSet) -> Views:
     if moulds.inner:
         yield from _curved(moulds, moulds.inner, views(moulds.inner))
         return
+    if plan.bench:
+        yield from load(f"{plan.bench}:views")(moulds)
+        return
     base, first = place_pieces(plan.of_kind("base")), plan.steps[0]
     if not plan.of_kind("cup"):
-        yield from _tray(moulds, base, first)
+        yield from tray_views(moulds, base, first)
         return
     pressed = arrow(DOWN, 0.0, -0.8 * plan.layout.cup[1], first.rim + 5, 8.0)
     yield "dry-fit", View((*base, Placed(first.cup)), (pressed,), names=(_corner(moulds, first.rim),))
@@ -269,6 +275,13 @@ def _injected(
     """Yield the views of a lid that is held down, filled and cured, with a band at x = `band`."""
     names = (Name("rubber band", (band, 0.0, step.top + 1)),)
     yield "lid-held", View(closed, held, group=group, names=names)
+    yield from injected_views(moulds, step, closed, held, group)
+
+
+def injected_views(
+    moulds: MouldSet, step: Step, closed: tuple[Placed, ...], held: tuple[Extra, ...], group: Group = "moulds"
+) -> Views:
+    """Yield the views of a closed mould that is injected and cured."""
     # Of the second cavity, if there are several: clear of the syringe. The vent nearest the eye.
     count = len(step.channels) // len(step.layer)
     first = count if len(step.channels) > count else 0
@@ -379,7 +392,7 @@ def _skin_on(moulds: MouldSet) -> Views:
     yield "skin-cure", View((*trays, *units), (film, *within), way=0)
 
 
-def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
+def tray_views(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
     """Yield the views of the one pour of a tray, a mould without cups."""
     x, lengths = moulds.plan.layout.plate[0], moulds.spec.moulds
     filled = *tray, *place_pieces([step])

@@ -18,8 +18,8 @@ from unitcad.attenuation.edge.scoring import OVERTURNED, sign_flip_p
 from unitcad.cli.output import print_json, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.cli.tables import console
-from unitcad.documents import rounded
 from unitcad.export.chart import Series, chart
+from unitcad.json_text import rounded
 from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
 from unitcad.spec.convert import without_none
 from unitcad.spec.toml import text_of

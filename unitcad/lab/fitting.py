@@ -21,9 +21,10 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
-from unitcad.documents import read_toml, rounded
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.estimate_inputs import estimate_input
+from unitcad.json_text import rounded
 from unitcad.lab.campaign import File, Name, file_of
 from unitcad.lab.shrunk_fit import BETWEEN_LABS, Campaigns, Judged, Shrunk, gradients, judge, paired_difference, shrunk
 from unitcad.spec import Spec, check_plain, convert, to_data

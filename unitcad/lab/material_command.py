@@ -15,9 +15,10 @@ from unitcad.catalogue import Material, MaterialEntry, choose
 from unitcad.cli.output import print_indented, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
 from unitcad.cli.tables import console, print_table
-from unitcad.documents import read_toml, rounded
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
+from unitcad.json_text import rounded
 from unitcad.lab.material import (
     DynamicResult,
     Specimen,

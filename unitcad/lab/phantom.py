@@ -20,9 +20,10 @@ from unitcad.catalogue import Material, Printer, choose, materials, printers, ti
 from unitcad.catalogue import entries as kinds
 from unitcad.catalogue.entries import between
 from unitcad.designs import layer_colour
-from unitcad.documents import parse_toml, rounded
+from unitcad.documents import parse_toml
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import tissue_layer
+from unitcad.json_text import rounded
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union

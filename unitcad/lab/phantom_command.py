@@ -16,9 +16,9 @@ from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, for_ca
 from unitcad.catalogue import printers
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Out
-from unitcad.documents import rounded
 from unitcad.export import printing, svg
 from unitcad.export.printing import print_ready
+from unitcad.json_text import rounded
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.lab.phantom import (
     LOSS_FACTOR,

@@ -91,12 +91,12 @@ def _compared(old: FileReport, new: FileReport, same: bool, options: Options, dr
     change = Change("changed", old.facts, gone)
     try:
         clock = Deadline(options.limits.seconds)
-        before, after = (surface_of(Path(report.path), options, clock) for report in (old, new))
-        if len(before) and len(after):
-            farthest = largest_distance(before, after, clock.tick)
+        surfaces = [surface_of(Path(report.path), options, clock) for report in (old, new)]
+        if all(len(surface) for surface in surfaces):
+            farthest = largest_distance(surfaces[0], surfaces[1], clock.tick)
             change = replace(change, distance_mm=farthest.distance, error_mm=farthest.error)
             if draw is not None:
-                draw(new.path, before, after)
+                draw(new.path, surfaces[0], surfaces[1])
     except Unreadable:  # which the reports say
         pass
     return replace(marked, change=change)

@@ -212,6 +212,12 @@ class MouldSet:
         return self._meshes[shape]
 
     @property
+    def height(self) -> float:
+        """Height of the cast bodies of the unit, mm."""
+        boxes = [mesh.bounds(self.mesh(body)) for body in self.unit if body.made == "cast"]
+        return max(box[5] for box in boxes) - min(box[2] for box in boxes)
+
+    @property
     def plate(self) -> tuple[float, float]:
         """z of the lower and the upper face of the base's plate, mm: a tray, and cups on pins, need no plinth."""
         plinth = self.plan.of_kind("cup") and not self.plan.pins

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from unitcad import __version__
 from unitcad.cache import Store, digest
-from unitcad.documents import json_bytes
+from unitcad.json_text import json_bytes
 from unitcad.pipeline.manifest import CASTING, FileRecord, Manifest, count_findings
 from unitcad.pipeline.plan import kernel_versions
 from unitcad.pipeline.result import Product, Progress, Result

@@ -8,8 +8,8 @@ from typing import Any
 from unitcad.attenuation.edge.estimates import rounded_layered, summary
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
-from unitcad.documents import json_bytes
 from unitcad.estimate_inputs import estimate_input, estimate_spec
+from unitcad.json_text import json_bytes
 from unitcad.pipeline.manifest import EstimateSummary
 from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.plan import forget as forget_geometry

@@ -15,8 +15,9 @@ from pathlib import Path
 
 from unitcad import cache, files
 from unitcad.cache import MemoryStore, MissingContent, Store, digest
-from unitcad.documents import json_bytes, read_json, read_toml
+from unitcad.documents import read_json, read_toml
 from unitcad.errors import UnitcadError
+from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import check_outputs, code_version

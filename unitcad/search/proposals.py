@@ -18,9 +18,9 @@ from unitcad.attenuation.edge.words import first_line
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.checks import check_moulds
-from unitcad.documents import rounded
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
+from unitcad.json_text import rounded
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.candidates import (
     Candidates,

@@ -15,8 +15,9 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from unitcad.documents import parse_message, parse_toml
+from unitcad.documents import parse_toml
 from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
+from unitcad.json_text import parse_message
 from unitcad.serve import unit_answers
 from unitcad.serve.form import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted

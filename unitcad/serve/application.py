@@ -16,9 +16,10 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from unitcad.documents import parse_json, parse_message
+from unitcad.documents import parse_json
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
+from unitcad.json_text import parse_message
 from unitcad.report.page import page_data
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page

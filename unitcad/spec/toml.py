@@ -10,7 +10,7 @@ import msgspec
 import tomli_w
 from msgspec import structs
 
-from unitcad.documents import parse_message
+from unitcad.json_text import parse_message
 from unitcad.spec.convert import without_none
 from unitcad.spec.resolved import Spec, with_formats
 

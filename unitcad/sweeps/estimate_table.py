@@ -7,9 +7,9 @@ from pathlib import Path
 
 from msgspec import structs
 
-from unitcad.documents import rounded
 from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import answer_spec
+from unitcad.json_text import rounded
 from unitcad.pipeline.manifest import level_columns
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks

@@ -22,9 +22,9 @@ import msgspec
 
 from unitcad import files
 from unitcad.cache import digest
-from unitcad.documents import parse_message
 from unitcad.errors import UnitcadError
 from unitcad.extras import missing_extra
+from unitcad.json_text import parse_message
 
 _ADDRESS = re.compile(r"s3://[a-z0-9][a-z0-9.-]+(?:/[^/\s]+)*/?")
 MANIFEST = "manifest.json"

@@ -17,7 +17,7 @@ from unitcad.attenuation.edge.ranges import LabFit, error_block, own_block
 from unitcad.attenuation.edge.scores import Range, scores
 from unitcad.attenuation.edge.words import details, first_line, lines, skin_lines
 from unitcad.attenuation.inputs import EstimateInput, Quantity
-from unitcad.documents import rounded
+from unitcad.json_text import rounded
 
 ASSUMPTIONS = [
     "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`); the "

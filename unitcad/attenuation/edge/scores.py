@@ -8,6 +8,7 @@ from importlib.resources import files
 import msgspec
 
 from unitcad.attenuation.edge.measured import Moduli
+from unitcad.json_text import parse_message
 
 FILE = "scores.json"
 MODULI: tuple[Moduli, ...] = ("small-strain", "quasi-static")
@@ -82,7 +83,7 @@ class Scores(msgspec.Struct, frozen=True):
 
 @cache
 def _stored() -> dict[str, Scores]:
-    return msgspec.json.decode((files("unitcad.attenuation.edge") / FILE).read_bytes(), type=dict[str, Scores])
+    return parse_message((files("unitcad.attenuation.edge") / FILE).read_bytes(), dict[str, Scores], FILE)
 
 
 def scores(moduli: Moduli = "small-strain") -> Scores:

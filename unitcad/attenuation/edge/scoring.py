@@ -27,7 +27,7 @@ from unitcad.attenuation.edge.scores import (
     Range,
     Scores,
 )
-from unitcad.documents import rounded
+from unitcad.json_text import rounded
 
 Fit = Callable[[MeasuredTable, np.ndarray], np.ndarray]
 """From a table and masks (M, units) of the units to fit to, the levels of all units by each fit, (M, units)."""
