@@ -63,14 +63,46 @@ BODIES = {
         " top=polygon((-1, -9), (1, -9), (1, 9), (-1, 9)))])",
         HALVES,
     ),
+    "thimble": (
+        "cut(union([cone(8, 7, 0, 8), Common((ball(7, 8), box(-9, 9, -9, 9, 8, 20)))]),"
+        " [cone(6.5, 5.5, -1, 8), ball(5.5, 8)])",
+        HALVES,
+    ),
+    "bellows": (
+        "cut(union([cone(4, 6, 2 * i, 2 * i + 1) for i in range(3)] + [cone(6, 4, 2 * i + 1, 2 * i + 2)"
+        " for i in range(3)]), [cylinder(3, -1, 9)])",
+        SIDES,
+    ),
+    "suction cup": (
+        "cut(union([cone(8, 3, 0, 4), cylinder(3, 4, 7), cylinder(5, 7, 9)]), [cone(7, 2, -.5, 3.5)])",
+        SIDES,
+    ),
+    "dumbbell": ("union([ball(4, 4), cylinder(1.5, 4, 16), ball(4, 16)])", HALVES),
+    "ring with pegs": (
+        'union([ring(5, 7, 0, 3), *[rotated(moved(turned(cylinder(.8, 6, 9), "y", 1), z=1.5), "z", 45 * i)'
+        " for i in range(8)]])",
+        HALVES,
+    ),
+    "elbow": ('union([cylinder(2, 0, 10), moved(turned(cylinder(2, 0, 10), "y", 1), z=10), ball(2, 10)])', HALVES),
+    "knob": ("union([cylinder(2, 0, 6), torus(3, 1.5, 7)])", HALVES),
+    "dimples on four sides": (
+        'cut(union([cylinder(5, 0, 8), cylinder(6, 0, 1)]), [rotated(moved(ball(1.5, 0), 5, 0, 5), "z", 90 * i)'
+        " for i in range(4)])",
+        "four side pieces",
+    ),
 }
 """Each body, and the way in which it is cast: part of the plan's words, "" for a cup that lifts off."""
 QUICK = (
-    "text raised", "text engraved", "cone, wide above", "cone to a point", "cone under a lip", "hourglass", "barrel",
-    "ribs round", "chamfer below", "torus", "ball", "hole across", "shell, open above",
+    "text raised", "text engraved", "cone, wide above", "cone to a point", "barrel", "ribs round", "chamfer below",
+    "torus", "ball", "hole across", "shell, open above", "thimble", "bellows", "dimples on four sides",
 )  # fmt: skip
 REFUSED = {
     "closed hollow": ("cut(disc(7, 0, 6), [cylinder(5, 1, 5)])", "a hollow of 314 mm3 .* is closed all round"),
     "thin tube, standing": ("ring(6.7, 7, 0, 6)", "no mould was found; tried as drawn, a cup that lifts off: .*; "),
+    "pins across holes": (
+        "cut(box(-8, 8, -8, 8, 0, 2), [moved(cylinder(1, -1, 3), x, y) for x in (-5, 0, 5) for y in (-5, 0, 5)]"
+        ' + [moved(turned(cylinder(.3, -9, 9), "y", 1), z=1)])',
+        "no mould was found; tried as drawn",
+    ),
     "touching along an edge": ("union([box(-4, 0, -4, 0, 0, 3), box(0, 4, 0, 4, 0, 3)])", "touch along an edge only"),
 }

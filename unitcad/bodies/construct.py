@@ -15,15 +15,18 @@ from manifold3d import Manifold
 from unitcad.bodies.parted import Impossible, Mould, draw, inside
 from unitcad.bodies.search import Way, ways
 from unitcad.checks import check_geometry, strains
-from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.checks.finding import MouldFinding, at_least, at_most
+from unitcad.checks.strain import CAPTIVE
 from unitcad.designs import design_of
 from unitcad.designs.design import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
+from unitcad.export.printing import TooThin, print_ready, resolution
 from unitcad.kernels.mesh import arrays, bounds, realise, segment_count, thick_pieces
 from unitcad.moulds.complement import films
 from unitcad.moulds.mould_set import MouldSet, origin_of
 from unitcad.moulds.plan import Plan
-from unitcad.shape import Shape
+from unitcad.shape import ProfileError, Shape
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 
 BENCH = "unitcad.bodies.bench"
@@ -57,6 +60,7 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     else:
         raise first
     _refuse_hollows(spec, cast[0])
+    stretchy: Tooling | None = None
     for way, drawn in _drawn(spec, cast[0]):
         if isinstance(drawn, str):
             tried.append(f"{way.said}: {drawn}")
@@ -66,6 +70,10 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
         if not failed:
             return made
         tried.append(f"{way.said}: {_said(failed[0])}")
+        if not stretchy and all(each.code == "C310" and each.value < CAPTIVE for each in failed):
+            stretchy = made
+    if stretchy:
+        return stretchy  # whether a silicone bears it, C310 says
     if isinstance(first, Tooling):
         return first  # its findings say what is wrong with it
     raise Refusal("design", spec.design, f"no mould was found; tried {'; '.join(tried[:SAID])}{UNIT_ALONE}")
@@ -98,6 +106,8 @@ def _drawn(spec: Spec, body: Shape) -> Iterator[tuple[Way, Mould | str]]:
             yield way, draw(spec, body, way)
         except Impossible as error:
             yield way, str(error)
+        except ProfileError as error:
+            yield way, f"its tools can't be drawn: a part {error}"
         except Refusal as refusal:
             yield way, _reason(refusal)
 
@@ -106,7 +116,17 @@ def _failed(spec: Spec, plan: Plan) -> list[MouldFinding]:
     """Return the findings against a plan: of the checks of geometry, since variants in silicone share their tools."""
     moulds = MouldSet(spec, origin=replace(origin_of(spec), plan=lambda: plan))
     wide = (at_most("C310", strain.where, strain.percent, MOST_STRETCHED, "%") for strain in strains(moulds))
-    return [finding for finding in (*check_geometry(moulds), *wide) if not finding.ok]
+    failed = [finding for finding in (*check_geometry(moulds), *wide) if not finding.ok]
+    return failed or [finding for piece in plan.pieces if (finding := _too_thin(moulds, piece))]
+
+
+def _too_thin(moulds: MouldSet, piece: Body) -> MouldFinding | None:
+    """Return a finding if no mesh file can hold a piece: the mould has no thickness somewhere."""
+    try:
+        print_ready(*arrays(moulds.mesh(piece)))
+    except TooThin as error:
+        return at_least("C240", f"{piece.name}: {error}", 0.0, resolution(arrays(moulds.mesh(piece))[0]), "mm")
+    return None
 
 
 def _said(finding: MouldFinding) -> str:

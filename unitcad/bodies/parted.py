@@ -79,6 +79,8 @@ KEY_ROOM = 6.0
 """Room for the keys, beside the cavity's land, mm."""
 TAPER_DEG = 8.0
 """Taper of the frame: less than the angle of friction of printed plastic (0.2 or more), so that it stays pressed on."""
+LEAST_FRAME = 2.0
+"""Least height of the frame, mm (assumed)."""
 FRAME_HIGH, FRAME_WALL, FRAME_TRAVEL, FRAME_LOW = 8.0, 5.0, 2.0, 1.0
 """The frame: its height, its wall, the way that it can be pressed down, and its top under the rim, mm."""
 
@@ -242,9 +244,10 @@ def _cores(spec: Spec, cast: Shape, solid: Manifold, way: Way, rim: float, radiu
     """Return the cores over z = 0 that stand on the base: they fill holes and pockets that are open downwards."""
     edge, least = radius + BEYOND, films(spec)
     high = rim if way.open else bounds(solid)[5] + 1.0
-    beside = Cut(box(-edge, edge, -edge, edge, -BEYOND, high), (cast,))
+    # From the seat upwards only: under it the space of every core is one with that round the body.
+    beside = Cut(box(-edge, edge, -edge, edge, 0.0, high), (cast,))
     found: list[Shape] = []
-    for piece in thick_pieces(realise(beside, segments).trim_by_plane((0, 0, 1), 0.0), least):
+    for piece in thick_pieces(realise(beside, segments), least):
         x0, _, low, x1, _, top = bounds(piece)
         if x1 > edge - LEVEL and x0 < LEVEL - edge:
             continue
@@ -356,6 +359,8 @@ def _frame(frame: Frame, rim: float) -> Body:
     lay, slope, play = frame.lay, math.tan(math.radians(TAPER_DEG)), frame.spec.moulds.plinth_clearance_mm
     high = rim - FRAME_LOW
     low = max(high - FRAME_HIGH, skirt_end(frame.spec) + 1.0 + FRAME_TRAVEL)
+    if high - low < LEAST_FRAME:
+        raise Impossible(f"side pieces {rim:.2g} mm high are too low for a frame")
     inner = [outline(lay.cup, MARK, (rim - z) * slope + play) for z in (low - BEYOND, high + BEYOND)]
     outer = outline(lay.cup, MARK, (rim - low) * slope + play + FRAME_WALL)
     ring = cut(Extrude(outer, low, high), [Extrude(inner[0], low - BEYOND, high + BEYOND, top=inner[1])])

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.bodies.voxels import Voxels, voxels
+from unitcad.moulds.complement import LEAST_AREA
 from unitcad.shape.tree import Turn
 
 POSES: tuple[tuple[str, Turn], ...] = (
@@ -36,12 +37,12 @@ POSES: tuple[tuple[str, Turn], ...] = (
 NEGLIGIBLE = 2e-3
 """Share of the body's cubes up to which a way counts as free on the grid: what is really caught, the checks measure."""
 OPEN_SHARE = 0.25
-"""Share of the largest level section that an open top has, at least: less is poured through a gate."""
+"""Share of the largest level section from which an open top comes before a gate."""
 ANGLES = 12
 """Upright partings that are tried, over half a turn."""
 COSTS = {"tray": 0.0, "level": 1.0, "two": 2.0, "four": 4.0}
 """Of the pieces of a way, to be compared with a gate, which leaves a mark that has to be trimmed."""
-GATE_COST = 1.5
+GATE_COST, SMALL_TOP_COST = 1.5, 0.25
 
 
 @dataclass(frozen=True)
@@ -85,14 +86,18 @@ def ways(vertices: np.ndarray, faces: np.ndarray) -> Iterator[Way]:
         found: list[tuple[float, int, Way]] = []
         for rank, (name, turn, grid) in enumerate(grids):
             posed, total = vertices @ np.array(turn, float).T, int(grid.filled.sum())
-            opens = _open_top(grid)
+            area = _top_area(grid)
+            wide = area >= OPEN_SHARE * grid.filled.sum(axis=(0, 1)).max() * grid.side**2
             for kind, at, angle, count in (_level if "level" in kinds else _upright)(posed, faces, grid):
-                for opened in ((True, False) if opens else (False,)) if kind != "tray" else (True,) * opens:
+                # A closed mould first if little of the body would be open: less of it is struck off by hand.
+                tops = (True, False) if wide else (False, True) if area >= LEAST_AREA else (False,)
+                for opened in tops if kind != "tray" else (True,) * (True in tops):
                     way = Way(name, turn, kind, at, angle, opened, count * grid.side**3)
                     if count > NEGLIGIBLE * total:
                         caught.append(way)
                     else:
-                        found.append((COSTS[kind] + GATE_COST * (not opened), rank, way))
+                        cost = 0.0 if opened and wide else GATE_COST + SMALL_TOP_COST * opened
+                        found.append((COSTS[kind] + cost, rank, way))
         yield from (way for _, _, way in sorted(found, key=lambda each: each[:2]))
     yield from sorted(caught, key=lambda way: way.caught)
 
@@ -172,11 +177,10 @@ def _pockets(grid: Voxels) -> int:
     return int((grid.inner & grid.blocked(2, 1) & grid.blocked(2, -1)).sum())
 
 
-def _open_top(grid: Voxels) -> bool:
-    """Tell whether the top is flat and wide enough to pour through and strike off."""
+def _top_area(grid: Voxels) -> float:
+    """Return the area of the highest level of a body, mm2: it can be poured through and struck off."""
     areas = grid.filled.sum(axis=(0, 1))
-    top = int(np.nonzero(areas)[0].max())
-    return bool(areas[top] >= OPEN_SHARE * areas.max())
+    return float(areas[int(np.nonzero(areas)[0].max())]) * grid.side**2
 
 
 def about_z(degrees: float) -> np.ndarray:
