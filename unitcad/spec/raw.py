@@ -302,7 +302,7 @@ class RawSpec(Table, frozen=True, kw_only=True):
     casting: CastingTable = CastingTable()
     estimate: EstimateTable = EstimateTable()
     output: OutputTable = OutputTable()
-    materials: dict[str, MaterialEntry] = {}
+    materials: Annotated[dict[str, MaterialEntry], Meta(max_length=1000)] = {}
     motors: dict[str, MotorEntry] = {}
     printers: dict[str, PrinterEntry] = {}
     tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1, description=_TISSUE)]] = {}
