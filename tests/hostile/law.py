@@ -74,6 +74,7 @@ class Law:
 
     def __exit__(self, *raised):
         self.process.stdin.close()
+        self.process.stdout.close()
         self.process.wait()
 
     def run(self, words, cwd, until=""):
