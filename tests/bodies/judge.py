@@ -10,15 +10,15 @@ STEP, FAR = 0.25, 30.0
 """Steps of a piece on its way, and its whole way, mm."""
 
 
-def of_tools(moulds):
-    """Return the tools of the pour as assembled, by name."""
-    return {name: moulds.pressed[name] for name in moulds.plan.steps[0].tools}
+def of_tools(moulds, step):
+    """Return the tools of a pour as assembled, by name."""
+    return {name: moulds.pressed[name] for name in step.tools}
 
 
 def collisions(moulds):
     """Yield (piece, other, mm, mm3) for every touch on the pieces' ways out, the silicone among the others."""
     (step,) = moulds.plan.steps
-    left = of_tools(moulds)
+    left = of_tools(moulds, step)
     silicone = Manifold.batch_boolean(moulds.meshes(step.layer), OpType.Add)
     for removal in step.removals:
         piece = left.pop(removal.piece)
@@ -30,10 +30,10 @@ def collisions(moulds):
                     yield removal.piece, name, float(far), shared
 
 
-def cavity(moulds):
-    """Return the free spaces of the closed mould up to its rim that the body is in. Grease fills the seals."""
-    (step,) = moulds.plan.steps
-    tools = Manifold.batch_boolean([*of_tools(moulds).values(), *moulds.meshes(step.seals)], OpType.Add)
+def cavity(moulds, step):
+    """Return the free spaces of a pour's mould up to its rim that its layer is in. Grease fills the seals."""
+    there = [*of_tools(moulds, step).values(), *moulds.meshes((*step.seals, *step.earlier))]
+    tools = Manifold.batch_boolean(there, OpType.Add)
     x0, y0, z0, x1, y1, _ = tools.bounding_box()
     block = Manifold.cube((x1 - x0, y1 - y0, step.top - z0)).translate((x0, y0, z0))
     bodies = moulds.meshes(step.layer)

@@ -14,16 +14,14 @@ from signals import repeats, wave
 from tests.in_process import unitcad
 from tests.refusals import refuses
 from unitcad.attenuation.edge.closed_form import published_path
-from unitcad.attenuation.edge.measured import measured_table, nominal
+from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import COMPARED, stored
 from unitcad.attenuation.edge.ranges import predictive_of, unit_key
-from unitcad.attenuation.edge.scoring import assess_all
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of
 from unitcad.files import sha256
 from unitcad.lab.fit_command import contents, fit_toml, leads_text, order, sections
 from unitcad.lab.fitting import fit_lab, load_fit_lab
-from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired_difference, shrunk
 from unitcad.spec import spec_hash, to_data
 from unitcad.sweeps.estimate_table import levels
 from unitcad.sweeps.sweep import load_sweep
@@ -154,6 +152,59 @@ def test_the_command_writes_its_files_and_prints_the_null(tmp_path):
     assert json.loads(shown.stdout)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())
 
 
+def two_labs(folder, own=3):
+    """Write units of this lab, of lab b, whose levels are 1.5 times as high, and of two castings of it."""
+    kinds = ("single-embedded", "embedded", "encapsulating")
+    levels = {"single-embedded": 0.45, "embedded": 0.12, "encapsulating": 0.045}
+    units = [{"name": f"a{i}", "spec": kind, "level": {"value": levels[kind]}} for i, kind in enumerate(kinds[:own])]
+    for i in range(12):
+        level = {"value": 1.5 * levels[kinds[i % 3]] * (1.1 if i < 6 else 1 / 1.1)}
+        units.append({"name": f"b{i}", "lab": "b", "batch": f"c{i // 6}", "spec": kinds[i % 3], "level": level})
+    return _written(folder, units)
+
+
+def test_another_lab_s_units_have_that_lab_s_factor(tmp_path):
+    result = fit_lab(load_fit_lab(two_labs(tmp_path)))
+    rows = {(row["kind"], row["name"]): row for row in json.loads(contents(result)["fit.json"])["effects"]}
+    of_b = rows["lab", "b"]
+    assert 1 < of_b["factor"] < 1.5 < of_b["high"]  # drawn to 1: three units of this lab do not tell much
+    assert rows["batch", "b, c0"]["factor"] > rows["batch", "b, c1"]["factor"]
+    assert {name for kind, name in rows if kind == "scatter"} == {"between labs", "between units", "between batches"}
+    assert (result.fit.units, [one.lab for one in result.fit.measured]) == (3, [None] * 3 + ["b"] * 12)
+    (tmp_path / "lab-fit.toml").write_text(fit_toml(result))
+    answer = estimate_spec(load("embedded", {"estimate.fit": str(tmp_path / "lab-fit.toml")}))["answer"]
+    assert "fitted to 3 units of bench, 12 of other labs and the 9 of the paper" in answer["lines"][1]
+    assert answer["level"] == pytest.approx(0.12, rel=0.15)
+    assert [one["level"] for one in answer["measured"]] == [0.12]
+
+
+def test_without_units_of_its_own_a_lab_has_a_wider_range(tmp_path):
+    ends = {}
+    for own in (0, 3):
+        (tmp_path / "lab-fit.toml").write_text(fit_toml(fit_lab(load_fit_lab(two_labs(tmp_path, own)))))
+        done = unitcad(
+            "estimate", "embedded", "--fit", tmp_path / "lab-fit.toml", "--set", "layers.0.wall_mm=2", "--json"
+        )
+        answer = json.loads(done.stdout)["answer"]
+        ends[own] = answer["high"] / answer["low"]
+        assert answer["measured"] == []
+    assert ends[0] > 1.1 * ends[3]
+    said = unitcad("fit", two_labs(tmp_path, 0)).stdout
+    assert "as without units of the lab's own" in said
+
+
+def test_units_of_one_cast_record_are_one_batch(tmp_path):
+    cast_record(tmp_path, lambda data: data.update(units=[{"cavity": 1}, {"cavity": 2}, {"cavity": 4}]))
+    level = {"value": 0.06}
+    units = [{"name": f"u{i}", "cast": CAST, "cavity": i, "level": level} for i in (1, 2)]
+    units += [{"name": "u4", "cast": CAST, "cavity": 4, "batch": "other", "level": level}]
+    units += [{"name": "paper's", "lab": "paper", "spec": "embedded", "level": {"value": 0.1}}]
+    result = fit_lab(load_fit_lab(_written(tmp_path, units)))
+    assert result.campaigns.batch.tolist() == [-1] * 9 + [0, 0, 1, -1]
+    assert result.campaigns.lab.tolist() == [1] * 9 + [0, 0, 0, 1]
+    assert list(result.leading.batches) == [0]
+
+
 LOSSY = {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}
 
 
@@ -265,11 +316,11 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path):
     assert [layer.wall_mm for layer in one.spec.layers] == [1.25, 1.25]
     assert {file.file: file.sha256 for file in lab.inputs}[CAST] == sha256(tmp_path / CAST)
     fit = fit_lab(lab).fit
-    walls = ["layers.0.wall_mm=1.4", "layers.1.wall_mm=1.1"]
-    own = 0.06 / float(published_path(nominal(estimate_input(load("encapsulating", walls))))[0])
-    weight = 1 / (1 + (one.error / fit.model["published"].model_error) ** 2)
-    stored, found = fit.model["published"].stored["s"], fit.model["published"].constants["s"]
-    assert np.log(found) == pytest.approx((0.9 * np.log(stored) + weight * np.log(own)) / (0.9 + weight), abs=2e-3)
+    direct = {"name": "b", "spec": "encapsulating", "level": {"value": 0.06, "low": 0.055, "high": 0.065}}
+    direct["set"] = {"layers.0.wall_mm": 1.4, "layers.1.wall_mm": 1.1}
+    typed = fit_lab(load_fit_lab(_written(tmp_path, [direct]))).fit
+    for name in COMPARED:
+        assert fit.model[name].constants == pytest.approx(typed.model[name].constants, rel=1e-5)
     assert fit.measured[0].key == unit_key(estimate_input(load("encapsulating")))
     assert fit.measured[0].source == "as typed, walls as measured, 1.4, 1.1 mm"
 
@@ -313,51 +364,6 @@ def test_a_campaign_s_unit_goes_into_a_fit_by_its_cast_record(tmp_path):
     lab = load_fit_lab(cast_fit_file(tmp_path, cavity=2, measured="m/measured.toml"))
     assert lab.units[0].level.value == pytest.approx(0.1, rel=0.01)
     assert lab.units[0].source == "m/measured.toml, chain line, walls as measured, 1.4, 1.1 mm"
-
-
-@pytest.mark.parametrize("name", ["corrected", "published", "rule", "baseline"])
-@pytest.mark.parametrize(("between", "for_lab"), [(0.3, True), (4.0, True), (1.0, False)])
-def test_a_linear_model_is_generalised_least_squares(name, between, for_lab):
-    """The lab's constants are the paper's plus a normal step: one covariance matrix over all units, no prior's weight.
-
-    The step's covariance is n between^2 (J'J)^-1 of the other campaign, and its mean is flat.
-    """
-    model = COMPARED[name]
-    levels = np.exp(np.random.default_rng(8).normal(-1.0, 0.7, 13))
-    table, own = replace(measured_table().rows([*range(9), 3, 5, 7, 1]), levels=levels), np.arange(13) >= 9
-    here = own == for_lab
-    found = shrunk(model, Campaigns(table, own, np.zeros(13), between), for_lab)
-    size = len(model.names)
-    j = gradients(model, table, np.ones(size))
-    y = np.log(table.levels) - table.mean(lambda units: model.logs(units, np.ones(size)))
-    there = ~here
-    step = there.sum() * between**2 * np.linalg.inv(j[there].T @ j[there])
-    # Unknown are the lab's constants; the other campaign's units are those less the step.
-    covariance = np.eye(y.size)
-    covariance[np.ix_(there, there)] += j[there] @ step @ j[there].T
-    inverse = np.linalg.inv(covariance)
-    information = j.T @ inverse @ j
-    mean = np.linalg.solve(information, j.T @ inverse @ y)
-    residual = y - j @ mean
-    assert np.log(found.constants) == pytest.approx(mean, rel=1e-9)
-    assert found.covariance == pytest.approx(np.linalg.inv(information), rel=1e-9)
-    assert found.df == y.size - size
-    assert found.sigma == pytest.approx(np.sqrt(residual @ inverse @ residual / found.df), rel=1e-9)
-
-
-@pytest.mark.parametrize("moduli", ["small-strain", "quasi-static", "data sheet"])
-def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
-    """The other implementation masks units in closed forms; so do the scores by source that were measured before."""
-    table = measured_table(moduli)
-    alone = Campaigns(table, np.zeros(9, dtype=bool), np.zeros(9))
-    judged = {name: judge(model, alone) for name, model in COMPARED.items()}
-    for name, one in assess_all(table).items():
-        assert np.abs(judged[name].errors) == pytest.approx(one.leave_one_out_errors, rel=1e-6, abs=1e-9), name
-    if moduli == "small-strain":  # units in their 80 % range, as they were counted before
-        assert [judged[name].coverage for name in ("published", "baseline")] == [8, 7]
-    one, two = (np.abs(judged[name].errors) for name in ("published", "baseline"))
-    difference, error, _ = paired_difference(judged["published"], judged["baseline"])
-    assert (difference, error) == pytest.approx((np.mean(one - two), stats.sem(one - two)))
 
 
 @pytest.fixture(scope="module")

@@ -155,7 +155,7 @@ def test_a_layer_below_its_rim_has_no_opening(tmp_path):
     with pytest.raises(
         Refusal, match=r"pour 2 can.t be cast: the layer.s top, at .*, z = 2 mm, leaves an opening of 0 mm2"
     ):
-        moulds_of(tmp_path, code, layers=2)
+        by_complement(tmp_path, code, layers=2)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from unitcad.casting import pouring
-from unitcad.casting.drawings import CLEAR, Extra, cast_colour, screwdrivers, tape
+from unitcad.casting.drawings import CLEAR, Extra, cast_colour
 from unitcad.casting.figures import LIFT_MIN, PEEL_MIN, Batch
 from unitcad.casting.plates import made_pieces
 from unitcad.casting.pouring import cure, injection_steps, mixing_steps, struck
@@ -22,15 +22,14 @@ from unitcad.casting.views import (
     Placed,
     View,
     Views,
+    cup_views,
     injected_views,
     picture_path,
     place_pieces,
     pour_picture,
-    tray_views,
 )
 from unitcad.catalogue import Material
 from unitcad.checks import draw, strains
-from unitcad.export.raster import Name
 from unitcad.kernels.mesh import bounds
 from unitcad.moulds.lid import TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
@@ -172,9 +171,8 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
 
 
 def _sides(moulds: MouldSet) -> tuple[Body, ...]:
-    """Return the side pieces; () for a tray and for halves."""
-    cups = moulds.plan.of_kind("cup")
-    return cups if len(cups) > 1 else ()
+    """Return the side pieces, which a frame holds; () for a tray and for cups that lift off."""
+    return moulds.plan.of_kind("cup") if moulds.plan.of_kind("frame") else ()
 
 
 def _pressed(moulds: MouldSet) -> str:
@@ -196,53 +194,38 @@ def views(moulds: MouldSet) -> Views:
     """Yield the views of the procedure, by their names."""
     plan, step, (base,) = moulds.plan, moulds.plan.steps[0], moulds.plan.of_kind("base")
     yield "pieces", View(place_pieces(made_pieces(moulds)), eye=OVER, group="pieces")
-    standing, cups, frames = place_pieces([base]), plan.of_kind("cup"), plan.of_kind("frame")
-    if not cups:
-        yield from tray_views(moulds, standing, step)
+    sides = _sides(moulds)
+    if not sides:
+        yield from cup_views(moulds)
         return
-    box = {body.name: bounds(moulds.mesh(body)) for body in (base, *cups, *frames)}
+    standing, frames = place_pieces([base]), plan.of_kind("frame")
+    box = {body.name: bounds(moulds.mesh(body)) for body in (base, *sides, *frames)}
     held = place_pieces(frames)
     colour, silicone = cast_colour(moulds, 1), place_pieces([step])
-    high = max(box[base.name][5], *(bounds(mesh)[5] for mesh in moulds.meshes(step.layer)))
 
     def pour(name: str) -> str:
         return f"pour{step.index}-{name}"
 
-    sides = _sides(moulds)
-    if sides:
-        out = max(2 * CLEAR, 0.35 * plan.layout.cup[0])
-        apart = tuple(Placed(s.name, (s.removal[0] * out, s.removal[1] * out, 0.0)) for s in sides if s.removal)
-        lift = tuple(Placed(f.name, (0.0, 0.0, step.rim + CLEAR - box[f.name][2])) for f in frames)
-        yield "dry-fit", View((*standing, *place_pieces(sides), *lift))
-        yield pour("sides-on"), View((*standing, *apart))
-        yield pour("frame-on"), View((*standing, *place_pieces(sides), *lift))
-        extras: tuple[Extra, ...] = ()
-    else:
-        apart = place_pieces(cups, z=high - box[cups[0].name][2] + CLEAR)
-        lift = ()
-        yield "dry-fit", View((*standing, *apart))
-        yield pour("cup-on"), View((*standing, *apart))
-        extras = tape(moulds, step)
-        yield pour("hold"), View((*standing, *place_pieces(cups)), extras)
-    closed = (*standing, *place_pieces(cups), *held)
+    out = max(2 * CLEAR, 0.35 * plan.layout.cup[0])
+    apart = tuple(Placed(s.name, (s.removal[0] * out, s.removal[1] * out, 0.0)) for s in sides if s.removal)
+    lift = tuple(Placed(f.name, (0.0, 0.0, step.rim + CLEAR - box[f.name][2])) for f in frames)
+    yield "dry-fit", View((*standing, *place_pieces(sides), *lift))
+    yield pour("sides-on"), View((*standing, *apart))
+    yield pour("frame-on"), View((*standing, *place_pieces(sides), *lift))
+    closed = (*standing, *place_pieces(sides), *held)
     if step.injected:
-        yield from ((pour(name), view) for name, view in injected_views(moulds, step, closed, extras))
+        yield from ((pour(name), view) for name, view in injected_views(moulds, step, closed, ()))
     else:
         cell = plan.layout.cells[0]
         x0, _, _, x1, _, _ = bounds(moulds.meshes(step.layer)[0])
         thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), x0 + 0.3 * (x1 - x0), cell.y)
-        filled = (*extras, *(Extra(union(step.channels), colour) for _ in range(bool(step.channels))))
+        filled = (Extra(union(step.channels), colour),) if step.channels else ()
         blades = place_pieces(plan.of_kind("blade"), -0.55 * plan.layout.cup[0])
         yield pour("pour"), View((*closed, *silicone), (*filled, Extra(thread, colour)))
         yield pour("strike"), View((*closed, *silicone, *blades), filled)
         yield pour("filled"), View((*closed, *silicone), filled)
-    if sides:
-        yield pour("frame-off"), View((*standing, *place_pieces(sides), *silicone, *lift), way=1)
-        yield pour("sides-off"), View((*standing, *apart, *silicone), way=1)
-    else:
-        lever = Name("screwdriver", (plan.layout.plate[0] + 8.0, 0.0, moulds.plate[1]))
-        levers = screwdrivers(plan.layout.cup[0], plan.layout.plate[0], moulds.plate[1] - 1.0)
-        yield pour("cup-off"), View((*standing, *silicone, *apart), levers, names=(lever,), way=1)
+    yield pour("frame-off"), View((*standing, *place_pieces(sides), *silicone, *lift), way=1)
+    yield pour("sides-off"), View((*standing, *apart, *silicone), way=1)
     low = min(bounds(mesh)[2] for mesh in moulds.meshes(step.layer))
     up = max(box[base.name][5], 0.0) - low + 2 * CLEAR
     yield "peel", View((*standing, *place_pieces([step], z=math.ceil(up))), way=1)

@@ -12,7 +12,7 @@ from itertools import islice
 
 from manifold3d import Manifold
 
-from unitcad.bodies.parted import Impossible, Mould, draw, inside
+from unitcad.bodies.parted import Impossible, Mould, closed_cups, draw, inside
 from unitcad.bodies.search import Way, ways
 from unitcad.checks import check_geometry, strains
 from unitcad.checks.finding import MouldFinding, at_least, at_most
@@ -30,6 +30,7 @@ from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 
 BENCH = "unitcad.bodies.bench"
+CLOSED = "as drawn: cups closed above, filled through a gate"
 MOST_DRAWN = 8
 """Ways that are drawn and checked before a body is refused."""
 MOST_STRETCHED = 100.0
@@ -47,8 +48,10 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     `first` is the tooling by complement, or its refusal; `planned` makes a plan of a tooling. Raises Refusal if no way
     can be drawn.
     """
-    if len(cast) > 1 or design_of(spec).laid_in:
+    if design_of(spec).laid_in:
         return _or_raise(first)
+    if len(cast) > 1:
+        return _closed(spec, cast, first, planned) if isinstance(first, Refusal) else first
     tried = [_AS_DRAWN]
     if isinstance(first, Tooling):
         failed = _failed(spec, planned(first))
@@ -77,6 +80,26 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     if isinstance(first, Tooling):
         return first  # its findings say what is wrong with it
     raise Refusal("design", spec.design, f"no mould was found; tried {'; '.join(tried[:SAID])}{UNIT_ALONE}")
+
+
+def _closed(spec: Spec, cast: Sequence[Shape], first: Refusal, planned: Callable[[Tooling], Plan]) -> Tooling:
+    """Return the tooling of several pours in closed cups. Raises the first refusal if that does not help either."""
+    if first.field not in _OF_THE_BODY:
+        raise first
+    try:
+        made = replace(closed_cups(spec, cast), way=CLOSED, bench=BENCH)
+        failed = _failed(spec, planned(made))
+        if not failed:
+            return made
+        why = _said(failed[0])
+    except (Impossible, ProfileError) as error:
+        why = str(error)
+    except Refusal as refusal:
+        why = _reason(refusal)
+    if why == _reason(first):
+        raise first
+    limit = f"{first.limit.removesuffix(UNIT_ALONE)}; with closed cups: {why}{UNIT_ALONE}"
+    raise Refusal(first.field, first.value, limit, first.nearest)
 
 
 def _or_raise(first: Tooling | Refusal) -> Tooling:

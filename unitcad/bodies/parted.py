@@ -26,7 +26,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
 from msgspec import structs
 
-from unitcad.bodies.search import Way, about_z
+from unitcad.bodies.search import POSES, Way, about_z
 from unitcad.checks.air import CREVICE, pocket_volume, pockets
 from unitcad.designs import dimensions
 from unitcad.designs.design import BEYOND, Layout, Tooling
@@ -34,7 +34,7 @@ from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import arrays, bounds, realise, segment_count, thick_parts, thick_pieces, widest
 from unitcad.moulds import lid
 from unitcad.moulds.base import outline, stand
-from unitcad.moulds.complement import LEAST_AREA, LEAST_WIDTH, films, regions
+from unitcad.moulds.complement import LEAST_AREA, LEAST_WIDTH, complement, films, regions
 from unitcad.moulds.cup import cup_blank, grooves, recess, skirt_end
 from unitcad.moulds.layout import MARK, Frame, layout
 from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece
@@ -144,6 +144,20 @@ def draw(spec: Spec, body: Shape, way: Way) -> Mould:
             tops=(rim,),
         ),
     )
+
+
+def closed_cups(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+    """Draw the tools of several pours by complement, their cups closed if a layer has too small an opening above.
+
+    Raises Impossible, or Refusal.
+    """
+    segments = segment_count(dimensions(spec).outer_radius, spec.output.tolerance_mm)
+    way = Way("as drawn", POSES[0][1], "level", (0.0, 0.0), 0.0, open=False, caught=0.0)
+
+    def gates(pour: int, solid: Manifold, rim: float) -> list[tuple[Shape, Shape]]:
+        return _channels(spec, solid, way, rim, segments)
+
+    return complement(spec, cast, ROOF, gates)
 
 
 def _turned(body: Shape, way: Way, segments: int) -> tuple[Shape, Manifold]:

@@ -152,7 +152,7 @@ def pour_picture(pour: int, name: str) -> str:
 
 
 def _views(moulds: MouldSet) -> Views:
-    plan, bottom = moulds.plan, moulds.plate[0]
+    plan = moulds.plan
     yield "pieces", View(place_pieces(made_pieces(moulds)), eye=OVER, group="pieces")
     if moulds.inner:
         yield from _curved(moulds, moulds.inner, views(moulds.inner))
@@ -160,6 +160,12 @@ def _views(moulds: MouldSet) -> Views:
     if plan.bench:
         yield from load(f"{plan.bench}:views")(moulds)
         return
+    yield from cup_views(moulds)
+
+
+def cup_views(moulds: MouldSet) -> Views:
+    """Yield the views of moulds with cups that lift off, after that of their pieces; or of a tray."""
+    plan, bottom = moulds.plan, moulds.plate[0]
     base, first = place_pieces(plan.of_kind("base")), plan.steps[0]
     if not plan.of_kind("cup"):
         yield from tray_views(moulds, base, first)
@@ -231,6 +237,11 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         yield "lid-on", View((*closed, off), (*on, grease_on_rim(moulds, step)), names=(grease,))
         held = *on, *bands(cup_x, lay.plate[1], bottom, step.top)
         yield from _injected(moulds, step, (*closed, Placed(step.lid)), held, cup_x - 2.0)
+        held = *held, Extra(union(step.channels), colour)
+    elif step.gated:
+        held = *on, *tape(moulds, step)
+        yield "hold", View(closed, held)
+        yield from injected_views(moulds, step, closed, held)
         held = *held, Extra(union(step.channels), colour)
     else:
         held = *on, *tape(moulds, step)

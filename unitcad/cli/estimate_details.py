@@ -159,8 +159,9 @@ def _mean(error: dict[str, Any], ends: dict[str, Any]) -> str:
 def _fit_line(fit: dict[str, Any]) -> str:
     """Return the line that names the fit and its scores."""
     scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["leave_one_out"].items())
-    paper = " and the paper's nine" if fit["include_paper_units"] else ""
-    units = f"{fit['own_units']} units of the lab{paper}"
+    parts = [f"{fit['own_units']} units of the lab"]
+    parts += [f"{others} of other labs"] if (others := fit["units_of_other_labs"]) else []
+    units = join_words([*parts, "the paper's nine"] if fit["include_paper_units"] else parts)
     name = f"fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})"
     return f"{name}, {fit['leads']} leads: {units}; leave-one-out error: {scores}"
 

@@ -62,8 +62,15 @@ MITRE = 3.0
 """How many clearances a sharp corner's copy moves out, at most: as far as a corner of 39 degrees needs."""
 
 
-def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+Channels = Callable[[int, Manifold, float], Sequence[tuple[Shape, Shape]]]
+"""From a pour (from 0), its layer and the top of its closed cup to the channels: each as drilled, and as filled."""
+
+
+def complement(spec: Spec, cast: Sequence[Shape], roof: float = 0.0, gates: Channels | None = None) -> Tooling:
     """Return the moulds of the layers `cast`, in the order of their pours, drawn about the unit's axis.
+
+    With `gates` a cup whose layer has too small an opening above is closed by a roof of `roof` mm, and filled through
+    them.
 
     If inserts of the design lead out of the silicone, the base carries them, and the cup has a slot for them, open
     downwards. Raises Refusal, with the pour and the place, for layers that leave a loose piece of mould.
@@ -86,8 +93,12 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
 
     injected, least = spec.moulds.pour == "injected", films(spec)
     standing, hung, tops = _carried(spec, cast, there, solids, rims, max(radii), segments)
+    closed = [gates is not None and not _is_open(spec, solid, rim) for solid, rim in zip(solids, rims, strict=True)]
     for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)):
-        _check_opening(spec, i, solid, rim)
+        if not closed[i]:
+            _check_opening(spec, i, solid, rim)
+    rims = tuple(rim + roof * shut for rim, shut in zip(rims, closed, strict=True))
+    gated = [gates(i, solids[i], rims[i]) if gates and shut else () for i, shut in enumerate(closed)]
     if laid:
         seat = max(radii) + spec.moulds.land_mm + spec.moulds.groove_width_mm
         standing = [Common((piece, box(-seat, seat, -seat, seat, -BEYOND, tops))) for piece in standing]
@@ -114,13 +125,14 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             for piece, solid in zip(standing, solid_of, strict=True)
             if wall.min_gap(solid, 2 * clearance) < clearance
         ]
-        overflow = grooves(frame, i)
+        overflow = [] if closed[i] else grooves(frame, i)
         own = realise(groove(frame, i, replace(lay.cells[0], x=0.0, y=0.0)), segments)
         if any(own.min_gap(realise(hole, segments), wall_kept) < wall_kept for hole in slid):
             overflow = []
         grooved.append(bool(overflow))
         bores, holes = in_cells([under]), in_cells(slid)
-        cup = cut(blank, [recess(frame), *bores, *holes, *overflow])
+        drilled = in_cells([shape for shape, _ in gated[i]])
+        cup = cut(blank, [recess(frame), *bores, *holes, *overflow, *drilled])
         parted = _pieces(realise(cup, segments), least)
         if len(parted) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
@@ -132,11 +144,15 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         rest = Cut(blank, tuple(bores))
         sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells([*standing, *there(i)]))),) if holes else ())
     tools, channels = [base_piece(base), *(cup_piece(i + 1, cup) for i, cup in enumerate(cups))], []
-    for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)) if injected else ():
+    for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)) if injected and not any(closed) else ():
         drilled, poured = (lid.channels_over(frame, i, solid.slice(rim - _UNDER), by) for by in (BEYOND, 0.0))
         tools.append(lid_piece(i + 1, lid.lid(frame, i, drilled, in_cells(hung[i]))))
         channels.append(tuple(poured))
-    tools += [] if injected else [blade_piece(blade(lay, dims.heights[-1]))]
+    tools += [] if injected or all(closed) else [blade_piece(blade(lay, dims.heights[-1]))]
+    if any(closed):
+        filled = tuple(tuple(moved(shape, c.x, c.y) for c in lay.cells for _, shape in each) for each in gated)
+        seals, grooved_of = tuple(sealed), tuple(grooved)
+        return Tooling(dims, lay, tuple(tools), seals, filled, grooved_of, tops=rims, gated=tuple(closed))
     return Tooling(dims, lay, tuple(tools), tuple(sealed), tuple(channels), tuple(grooved))
 
 
@@ -158,13 +174,22 @@ def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tupl
     return tuple(rims), tuple(radii)
 
 
-def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
-    """Raise Refusal if a layer's opening at its rim is too small to pour silicone through, or for the vents of a lid."""
-    injected = spec.moulds.pour == "injected"
+def _least_width(spec: Spec) -> float:
+    return lid.LEAST_VENT if spec.moulds.pour == "injected" else LEAST_WIDTH
+
+
+def _is_open(spec: Spec, solid: Manifold, rim: float) -> bool:
+    """Tell whether a layer's opening at its rim is large enough to pour silicone through, or for the vents of a lid."""
     width, area = max(regions(solid, rim), default=(0.0, 0.0))
-    wide = lid.LEAST_VENT if injected else LEAST_WIDTH
-    if area >= LEAST_AREA and width >= wide:
+    return area >= LEAST_AREA and width >= _least_width(spec)
+
+
+def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
+    """Raise Refusal if a layer's opening at its rim is too small."""
+    if _is_open(spec, solid, rim):
         return
+    injected, wide = spec.moulds.pour == "injected", _least_width(spec)
+    width, area = max(regions(solid, rim), default=(0.0, 0.0))
     corners = arrays(solid)[0]
     x, y, z = corners[corners[:, 2].argmax()]
     opening = f"an opening of {area:.2g} mm2 in the rim that takes a circle of {width:.2g} mm"

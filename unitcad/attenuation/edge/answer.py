@@ -69,6 +69,8 @@ class ModelLevel(msgspec.Struct, frozen=True):
 class Source(msgspec.Struct, frozen=True):
     """The model behind a level and the units that it is fitted to; `lab`: the fit's name, None for the paper's nine.
 
+    `units`: of the paper's nine, or of the fit's own lab; `of_others`: of other labs in that fit.
+
     Errors are leave-one-out factors, typical and worst; `baseline`: of the means of four classes. `coverage`: how many
     of the nine units lie in their own range, predicted without them.
     """
@@ -76,6 +78,7 @@ class Source(msgspec.Struct, frozen=True):
     model: str
     units: int
     lab: str | None
+    of_others: int
     with_paper: bool
     error: float
     worst: float | None
@@ -179,6 +182,7 @@ def _source(lead: Lead, variant: EstimateInput, fit: LabFit | None) -> Source:
         model=lead.model,
         units=fit.units if fit else best.count,
         lab=fit.name if fit else None,
+        of_others=len(fit.measured) - fit.units if fit else 0,
         with_paper=fit.include_paper_units if fit else True,
         error=leave_one_out_error(lead.model, variant, fit),
         worst=None if fit else best.worst,
@@ -204,12 +208,12 @@ def _of_paper(printed: dict[str, Any]) -> tuple[Measured, ...]:
 
 
 def _nearest(variant: EstimateInput, fit: LabFit | None) -> Nearest:
-    """Return the nearest measured unit as `measured.nearest` does; with a fit, of the lab's own ones."""
+    """Return the nearest measured unit as `measured.nearest` does; with a fit, of the lab's own ones if it has any."""
     if fit is None:
         found = nearest(variant)
         return Nearest(found["unit"], found["level"], tuple(found["differs_in"]))
     place = coordinates_of(variant)
-    unit = min(fit.measured, key=lambda one: float(np.nansum((np.array(one.place) - place) ** 2)))
+    unit = min(fit.own or fit.measured, key=lambda one: float(np.nansum((np.array(one.place) - place) ** 2)))
     apart = place - np.array(unit.place)
     silicones = ["silicones"] if not np.allclose(apart[LENGTHS:], 0.0) else []
     return Nearest(unit.unit, unit.value, (*silicones, *differing(apart)))

@@ -135,6 +135,7 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
         "name": fit.name,
         "leads": fit.leads,
         "own_units": fit.units,
+        "units_of_other_labs": len(fit.measured) - fit.units,
         "include_paper_units": fit.include_paper_units,
         "moduli": fit.moduli,
         "leave_one_out": {

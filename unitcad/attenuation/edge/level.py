@@ -327,7 +327,7 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         block["predictive"] = predictive_block(fit, model, variant, unknown(variant))
     if variant.amplitude is not None:
         block["edge_amplitude_um"] = _spread(variant, model, variant.amplitude * 1e6 * own)
-    by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
+    by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, fitted with those of other labs"
     block["constants"] = {**constants, "made_by": by_fit or "least squares of the log of nine measured levels"}
     # A control for each distinct material, by the number of its first layer.
     names = [layer.material for layer in variant.layers]

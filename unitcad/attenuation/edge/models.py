@@ -31,13 +31,15 @@ class Model:
 
     `fit` takes a table and weights (M, units) and returns constants (M, constants), by weighted least squares of ln
     level. `logs` takes units and constants (..., constants), and returns ln level with the units' rows last.
-    `gradient`, by the constants' logarithms, takes one set of constants; its last axis runs over them.
+    `gradient`, by the constants' logarithms, takes one set of constants; its last axis runs over them. `is_level`: 1
+    for a constant that is a level, 0 for a factor; the levels multiplied by a number multiply every unit's level.
     """
 
     names: tuple[str, ...]
     fit: Callable[[MeasuredTable, np.ndarray], np.ndarray]
     logs: Callable[[Units, np.ndarray], Any]
     gradient: Callable[[Units, np.ndarray], Any]
+    is_level: np.ndarray
 
     def levels(self, table: MeasuredTable, weights: np.ndarray) -> np.ndarray:
         """Return the levels of all units by each fit, shape (M, units)."""
@@ -66,7 +68,7 @@ def log_linear(
     def logs(units: Units, constants: np.ndarray) -> Any:
         return np.log(constants) @ np.moveaxis(columns(units), -1, 0) + (offset(units) if offset else 0.0)
 
-    return Model(names, fit, logs, lambda units, constants: columns(units))
+    return Model(names, fit, logs, lambda units, constants: columns(units), is_level)
 
 
 def one_constant(path: Predict) -> Model:

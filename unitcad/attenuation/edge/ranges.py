@@ -90,7 +90,7 @@ class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`.
 
     `place`: its `measured.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads; `features`: names
-    of those that no unit of the paper had.
+    of those that no unit of the paper had; `lab`: the other lab that measured it, None for the fit's own.
     """
 
     unit: str
@@ -102,6 +102,7 @@ class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     place: Annotated[list[float], Meta(min_length=len(COORDINATES), max_length=len(COORDINATES))]
     residual: float
     features: list[str] = []
+    lab: str | None = None
     source: str = ""
 
 
@@ -115,20 +116,27 @@ class InputFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A lab's fit: `units` of its own, with or without the paper's nine, by which moduli; `leads`: `models.leader`.
 
-    `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
+    `between_labs`, `between_batches`: expected standard deviation of ln level between labs and between batches, over
+    that between units.
     """
 
     format: Annotated[int, between(1, 1)]
     name: Annotated[str, Meta(min_length=1, max_length=100)]
-    units: Annotated[int, between(1, 100000)]
+    units: Annotated[int, between(0, 100000)]
     moduli: Literal["small-strain", "quasi-static"]
     include_paper_units: bool
     between_labs: Annotated[float, between(0, 100)]
+    between_batches: Annotated[float, between(0, 100)]
     seed: int
     leads: Literal["rule", "published", "corrected"]
     model: dict[str, ModelFit]
     measured: Annotated[list[OwnLevel], Meta(min_length=1)]
     input: list[InputFile] = []
+
+    @property
+    def own(self) -> list[OwnLevel]:
+        """The levels that the fit's own lab measured."""
+        return [one for one in self.measured if one.lab is None]
 
     def constants(self, model: str) -> dict[str, float]:
         """Return a model's constants. Raises KeyError for one that it does not have."""
@@ -230,7 +238,7 @@ def own_block(fit: LabFit, variant: EstimateInput) -> list[dict[str, Any]]:
     key = unit_key(variant)
     return [
         {name: getattr(one, name) for name in ("unit", "value", "low", "high", "frequency_hz", "source")}
-        for one in fit.measured
+        for one in fit.own
         if one.key == key
     ]
 
@@ -466,8 +474,10 @@ def _paper_place(units: Units) -> np.ndarray:
 def _of_lab(fit: LabFit) -> Lead:
     one = fit.model[fit.leads]
     paper = _of_paper(fit.moduli)
-    own = np.array([unit.place for unit in fit.measured])
-    inside, outside = own[:, LENGTHS : LENGTHS + 2].T
+    # Residuals of other labs and of the paper have those labs' circumstances in them: their units are places only.
+    known = [*fit.own, *(unit for unit in fit.measured if unit.lab is not None)]
+    places = np.array([unit.place for unit in known])
+    inside, outside = places[:, LENGTHS : LENGTHS + 2].T
     silicones = [float(inside.min()), float(inside.max()), float(outside.min()), float(outside.max())]
     contrast = float(np.max(np.abs(outside - inside)))
     if fit.include_paper_units:
@@ -478,9 +488,8 @@ def _of_lab(fit: LabFit) -> Lead:
         constants=one.constants,
         degrees_of_freedom=one.degrees_of_freedom,
         sigma=one.model_error,
-        # The paper's units count as places; their residuals belong to another lab.
-        places=np.concatenate([own, paper.places]) if fit.include_paper_units else own,
-        residuals=np.array([unit.residual for unit in fit.measured]),
+        places=np.concatenate([places, paper.places]) if fit.include_paper_units else places,
+        residuals=np.array([unit.residual for unit in fit.own]),
         silicones=(min(silicones), max(silicones)),
         contrast=contrast,
         common_slope=paper.common_slope,

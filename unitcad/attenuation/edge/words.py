@@ -71,7 +71,10 @@ def source_line(one: Answer) -> str:
     if source.lab is None:
         units = f"{source.units} measured units"
     else:
-        units = f"{source.units} units of {source.lab}{' and the 9 of the paper' if source.with_paper else ''}"
+        parts = [f"{source.units} units of {source.lab}"]
+        parts += [f"{source.of_others} of other labs"] if source.of_others else []
+        parts += ["the 9 of the paper"] if source.with_paper else []
+        units = join_words(parts)
     error = f"a factor of {_factor(source.error)}" if source.lab or source.model != RULE else ANY_FORM
     return f"The level is that of {model} fitted to {units}. It misses a unit that it was not fitted to by {error}."
 
