@@ -141,12 +141,15 @@ def test_a_bed_that_is_too_small_is_refused_at_the_count_that_was_changed():
     assert (fault.field, fault.at, fault.at_nearest) == ("moulds.bed_x_mm", "layout.columns", 9)
 
 
-def test_no_option_of_the_command_line_is_told_on_the_page():
-    path = custom_templates()["custom/dome"]
+def test_no_option_of_the_command_line_is_told_on_the_page(tmp_path):
+    hollow = "from unitcad.shape import cut, cylinder\n\ndef unit(spec):\n"
+    (tmp_path / "dome.py").write_text(f"{hollow}    return cut(cylinder(7, 0, 6), [cylinder(5, 3, 5)])\n")
+    path = tmp_path / "hollow.toml"
+    path.write_text(custom_templates()["custom/dome"].read_text("utf-8"))
     known = Trusted([_trusted_source(read_toml(path), path, code=True)])
     told = answered(Ask(text=path.read_text("utf-8"), what="moulds"), known).faults
     assert [fault.field for fault in told] == ["design"]
-    assert "can't be cast" in told[0].message
+    assert "closed" in told[0].message
     assert "--only" not in told[0].message
 
 

@@ -35,9 +35,8 @@ def every_spec():
 
 
 def subject_of(name, **changes):
-    """Load a spec or an array with coarse facets; the dome, whose moulds are refused, with a flat top."""
+    """Load a spec or an array with coarse facets."""
     changes = {"output.tolerance_mm": 0.1, **changes}
-    changes |= {"parameters.flat_mm": 1.6} if name.endswith("dome") and "gel" not in name else {}
     try:
         return load_subject(name, changes)
     except Refusal:  # of an array
