@@ -13,7 +13,7 @@ from scipy import integrate, stats
 from unitcad.attenuation.edge.contrast import Place, counts, place_of, unit_of_scale
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.catalogue import Value, materials
-from unitcad.catalogue.moduli import method_spread
+from unitcad.catalogue.moduli import method_spread, moduli_note
 from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.validation import from_data, load, read
 
@@ -214,3 +214,9 @@ def test_a_name_or_a_key_alone_changes_nothing():
     plain = ends(load("encapsulating"))
     same = {"materials": {"mine": {"like": "ecoflex-00-10", "density_g_cm3": 1.05}}, "layers.0.material": "mine"}
     assert ends(load("encapsulating", same)) == pytest.approx(plain, rel=1e-9)
+
+
+def test_a_printed_modulus_is_called_impossible_only_below_the_whole_range_of_slow_pulls():
+    said = {name: "no viscoelastic solid" in moduli_note(materials()[name]) for name in (NAMES[0], *NAMES[3:])}
+    assert said == {"ecoflex-00-10": False, "dragon-skin-10-medium": False, "dragon-skin-30": True}
+    assert "printed 15 kPa, slow pull 26.1 (12.2 to 40.6) kPa." in moduli_note(materials()[NAMES[0]])

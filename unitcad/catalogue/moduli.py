@@ -46,7 +46,8 @@ def moduli_note(material: Material) -> str:
     if not (printed and slow):
         return ""
     ends = f" ({number(slow.low, 3)} to {number(slow.high, 3)})" if slow.low and slow.high else ""
-    odd = ": no viscoelastic solid is softer at 125 Hz than in a slow pull" if float(printed) < float(slow) else ""
+    below = float(printed) < float(slow.low or slow)
+    odd = ": no viscoelastic solid is softer at 125 Hz than in a slow pull" if below else ""
     return (
         f"printed {number(printed, 3)} kPa, slow pull {number(slow, 3)}{ends} kPa{odd}. Methods differ by a factor of "
         f"{number(math.exp(method_spread()), 2)} (one standard deviation), which the range of a level holds"
