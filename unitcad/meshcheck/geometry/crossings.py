@@ -274,7 +274,7 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
     crossings = Crossings(faces, contact, near)
     slabs, waiting = slabs_of(steps, *faces.corners), list[Pairs]()
     try:
-        pairs = meeting_pairs(boxes.take(order, axis=0), tick)
+        pairs = meeting_pairs(boxes.take(order, axis=0), tick, _fans(faces))
         for near in _ahead(lambda block: slabs.meeting(*_strangers(faces, *block)), pairs):
             waiting.append(near)
             if sum(len(some) for some, _ in waiting) > _BLOCK:
@@ -338,6 +338,23 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
         several,
         rounding,
     )
+
+
+def _fans(faces: Faces) -> Ints | None:
+    """Return for each face the vertex of the largest fan that it belongs to, -1 for none; None if there is no fan.
+
+    Faces round a safe vertex do not cross, and the boxes of all those of a fan of long faces meet.
+    """
+    count = np.bincount(faces.corners.ravel(), minlength=len(faces.vertices))
+    if count.max(initial=0) < _FAN:
+        return None
+    size = np.where(faces.safe >= 0, count.take(faces.safe, mode="clip"), 0)
+    largest = np.argmax(size, axis=0)
+    rows = np.arange(size.shape[1])
+    return np.where(size[largest, rows] >= _FAN, faces.safe[largest, rows], -1)
+
+
+_FAN = 64  # faces round a vertex
 
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> Pairs:
