@@ -6,11 +6,14 @@ import re
 import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES, box, obj, package, stl
 from test_check_command import run
+
+import unitcad
 
 ROOT = Path(__file__).parents[2]
 WHEEL = ROOT / "packages" / "unitcad-check"
@@ -130,3 +133,16 @@ def test_the_wheels_libraries_are_those_of_the_package():
     own, whole = (tomllib.loads((at / "pyproject.toml").read_text("utf-8"))["project"] for at in (WHEEL, ROOT))
     assert set(own["dependencies"]) <= set(whole["dependencies"])
     assert own["requires-python"] == whole["requires-python"]
+
+
+def test_hatchling_makes_the_wheel(tmp_path, alone):
+    from hatchling.builders.wheel import WheelBuilder
+
+    (made,) = WheelBuilder(str(WHEEL)).build(directory=str(tmp_path))
+    with zipfile.ZipFile(made) as wheel:
+        names = set(wheel.namelist())
+        entry = wheel.read(next(name for name in names if name.endswith("entry_points.txt"))).decode()
+    there = {path.relative_to(alone).as_posix() for path in (alone / "unitcad_check").rglob("*.py")}
+    assert there <= names
+    assert Path(made).name.startswith(f"unitcad_check-{unitcad.__version__}-")
+    assert "unitcad-check = unitcad_check.meshcheck.alone:main" in entry
