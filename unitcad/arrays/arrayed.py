@@ -46,6 +46,7 @@ from unitcad.casting.procedure_text import files as written
 from unitcad.casting.steps import pour_warnings
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
+from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finish, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
@@ -178,6 +179,7 @@ class Arrayed(Compound):
             *covered_tails_warning(array),
             *crowded_tracks(array),
             *shallow_grooves(moulds),
+            *height_warnings(moulds),
             *play_missing(moulds),
             *(pour_warnings([asdict(pour) for pour in made.pours]) if made else []),
         ]

@@ -107,7 +107,8 @@ def list_pieces(moulds: MouldSet) -> Iterator[Item]:
             note = f"from film or steel strip of {number(dims.exit.height if dims.exit else 0.0, 3)} mm"
         else:
             item, made = plan.called(name), "printed upside down" if tool.upside_down else "printed as drawn"
-            note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+            first = number(lengths.first_layer_mm, 3)
+            note = f"{lengths.printer}, layers {number(lengths.layer_mm, 3)}, first layer {first} mm"
             note += "; one is a spare" if any(piece.name == SPARE_TONGUE for piece in more) else ""
         yield Item(item, count, "piece", made, note)
 

@@ -42,6 +42,7 @@ Amplitude = Annotated[float, between(0.001, 1e5, "amplitude of the motor")]
 
 Bed = Annotated[float, between(20, LONGEST_MM, "side of the printer's build volume")]
 LayerHeight = Annotated[float, between(0.005, 2, "height of a printed layer")]
+FirstLayer = Annotated[float, between(0.005, 2, "height of the first printed layer; default: as the others, layer_mm")]
 Play = Annotated[float, between(0, 2, "position error of the printer's axes, per side")]
 PlinthClearance = Annotated[float, between(0.01, 2, "gap between a cup and its plinth, per side")]
 RibInterference = Annotated[float, between(0, 2, "interference of a cup's ribs with its plinth, per side; 0: no ribs")]
@@ -199,6 +200,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     overhang_deg: Value[Annotated[float, between(0, 90, "largest lean from the vertical that prints without support")]]
     bridge_mm: Value[Annotated[float, between(0, LONGEST_MM, "longest bridge that prints without support")]]
     nozzle_mm: Value[Annotated[float, between(0.1, 2, "bore of the nozzle, of a printer of filament")]] | None = None
+    first_layer_mm: Value[FirstLayer] | None = None
     rib_interference_mm: Value[RibInterference] | None = None
     bore_compensation_mm: Value[BoreCompensation] | None = None
     support: (

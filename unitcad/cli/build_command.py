@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Container, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -34,8 +34,10 @@ from unitcad.cli.shared_options import (
     with_fit,
 )
 from unitcad.designs import widths
+from unitcad.designs.printed import OVER_ALL
 from unitcad.errors import UnitcadError, WrongArgument, install_step
 from unitcad.meshcheck.findings import counted
+from unitcad.moulds.heights import NEAR
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
 from unitcad.pipeline.optional import UNMADE
@@ -115,7 +117,8 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
         each = f"{cells} units, each " if cells > 1 else ""
         cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
         across = " x ".join(number(width, 3) for width in widths(spec, cast))
-        yield f"{each}{across} mm across, {high} mm high{circuit}{silicone}"
+        made = _as_printed(json.loads((built.folder / "casting.json").read_bytes())) if manifest["casting"] else ""
+        yield f"{each}{across} mm across, {made or f'{high} mm high'}{circuit}{silicone}"
     yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
@@ -123,6 +126,20 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
     if level := manifest["estimate"]:
         yield from level["lines"]
     yield from to_open(built.folder)
+
+
+def _as_printed(casting: dict[str, Any]) -> str:
+    """Write the height over all and the caps as the printer makes them; "" if it makes what is drawn."""
+    heights = casting["unit_heights"]
+    total = next((each for each in heights if each["what"] == OVER_ALL), None)
+    caps = [each for each in heights if each["what"].endswith("'s cap")]
+    near = NEAR * casting["printing"]["layer_mm"]
+    if total is None or all(abs(each["printed_mm"] - each["asked_mm"]) <= near for each in (total, *caps)):
+        return ""
+    drawn, printed = (number(total[key], 3) for key in ("asked_mm", "printed_mm"))
+    thick = join_words(number(each["printed_mm"], 3) for each in caps) if caps else ""
+    named = f", cap{'s' * (len(caps) > 1)} {thick}" if caps else ""
+    return f"{printed} mm high (drawn {drawn}){named}"
 
 
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
@@ -249,7 +266,7 @@ def _print_faults(manifest: Manifest) -> None:
             warn(f"warning: {entry['output']} {entry['reason']}")
     checks = manifest["mould_checks"]
     for check in checks:
-        if check["ok"] and check["advice"]:
+        if check["ok"] and check["advice"] and check["advice"] not in manifest["warnings"]:
             warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}".rstrip() + f", limit {check['limit']:.3g}"

@@ -14,6 +14,7 @@ from unitcad.attenuation.edge.estimates import summary
 from unitcad.checks.finding import FindingRecord
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
+from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.plan import kernel_versions
 from unitcad.spec import Spec, spec_hash
@@ -163,6 +164,11 @@ class Geometry(TypedDict):
     skipped: list[Skipped]
 
 
+def _of_tools(moulds: MouldSet) -> list[str]:
+    """Return the warnings about the tools, known before anything is meshed."""
+    return [*shallow_grooves(moulds), *height_warnings(moulds)]
+
+
 def of_unit(
     moulds: MouldSet,
     only: Sequence[str],
@@ -181,7 +187,7 @@ def of_unit(
         hash=spec_hash(spec)[:12],
         outputs=list(only),
         label=shape["label"],
-        warnings=[*warnings(spec), *(shallow_grooves(moulds) if "moulds" in only else [])],
+        warnings=[*warnings(spec), *(_of_tools(moulds) if "moulds" in only else [])],
         air_ring_mm=shape["air_ring_mm"],
         compensation={
             "shrinkage_percent": spec.moulds.shrinkage_percent,

@@ -19,6 +19,7 @@ from unitcad.errors import Refusal, UnknownKey
 from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
+from unitcad.spec.layers import Layers
 from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, FpcbTable, MouldsTable, RawSpec
 from unitcad.spec.resolved import CastLayer, MotorSize
 from unitcad.text import number, with_article
@@ -167,21 +168,25 @@ def _moulds(raw: RawSpec, design: Design) -> MouldsTable:
     printer = catalogue.choose("moulds.printer", raw.moulds.printer, catalogue.printers(raw.printers))
     given = structs.asdict(raw.moulds)
     lengths = {name: float(getattr(printer, name) or 0.0) for name in _PRINTER_LENGTHS if given[name] is None}
+    least = least_slot(raw.fpcb, raw.wires, design.wire_sides)
     if "slot_height_mm" in lengths:
-        least = least_slot(raw.fpcb, raw.wires, design.wire_sides)
         lengths["slot_height_mm"] = max(lengths["slot_height_mm"], least)
     layer = raw.moulds.layer_mm or lengths["layer_mm"]
+    layers = Layers(raw.moulds.first_layer_mm or lengths["first_layer_mm"] or layer, layer)
     lengths |= {name: least for name, least in _BASE.items() if given[name] is None}
     if "plinth_height_mm" in lengths:
         lengths["plinth_height_mm"] = max(lengths["plinth_height_mm"], _for_leaves(printer, {**given, **lengths}))
     if given["shrinkage_percent"] is None:
         known = catalogue.materials(raw.materials)
         lengths["shrinkage_percent"] = max(float(known[one.material].shrinkage_percent or 0.0) for one in raw.layers)
-    heights = {
-        name: round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
-        for name in ("slot_height_mm", *_BASE)
-        if name in lengths
-    }
+    heights = {"first_layer_mm": layers.first}
+    if "plate_mm" in lengths:
+        heights["plate_mm"] = layers.up(lengths["plate_mm"])
+    if "plinth_height_mm" in lengths:
+        heights["plinth_height_mm"] = round(layers.steps(lengths["plinth_height_mm"]), 9)
+    if "slot_height_mm" in lengths:  # a tongue is printed flat, and as high as its slot
+        nearest = layers.nearest(lengths["slot_height_mm"])
+        heights["slot_height_mm"] = nearest if nearest >= least - 1e-9 else layers.up(least)
     convert(heights, MouldsTable, "moulds")  # they may exceed their limits; the other lengths were checked before
     return structs.replace(raw.moulds, **{**lengths, **heights})
 
