@@ -12,6 +12,7 @@ from msgspec import to_builtins
 
 from unitcad import catalogue
 from unitcad.casting.coupon import Coupon, write
+from unitcad.catalogue.moduli import moduli_note
 from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.designs import shipped as designs
@@ -108,6 +109,8 @@ def list_(
             how = f"; {value['method']}" if "method" in value else ""
             bounds = f" ({value['low']:g} to {value['high']:g})" if "low" in value else ""
             typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
+        if kind == "materials" and (note := moduli_note(catalogue.materials()[name])):
+            typer.echo(f"  moduli: {note}")
 
 
 def _values(entries: dict[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from msgspec import structs
 
 from unitcad.designs.dimensions import poured
-from unitcad.designs.printed import SHORT, Height, in_layers, printed_heights
+from unitcad.designs.printed import OVER_ALL, SHORT, Height, in_layers, printed_heights
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec, printer_of
 from unitcad.spec.layers import layers_of
@@ -26,8 +26,8 @@ MOST_OF_NOZZLE = 0.75
 def unit_heights(moulds: MouldSet) -> list[Height]:
     """Return the cavity's depth, every layer's height over its ground, the height over all, and the tongue's thickness.
 
-    Those of silicone are of the cured unit: it shrinks from the tools' lengths. Of tools by complement, which no
-    lengths of rings define, none are known.
+    Those of silicone are of the cured unit: it shrinks from the tools' lengths. Of cups by complement they are those
+    of the layers' tops; none are known of a body that is turned, or under a roof with channels.
     """
     plan, spec, layers = moulds.plan, moulds.spec, layers_of(moulds.spec)
     if not plan.of_kind("cup"):  # a tray, whose floor is its plate's face
@@ -35,7 +35,11 @@ def unit_heights(moulds: MouldSet) -> list[Height]:
         sheet = layers.printed(bottom + step.rim) - layers.printed(bottom)
         return [Height("sheet's thickness", round(step.rim, 4), round(sheet, 4))]
     if not plan.concentric and not plan.pins:
-        return []
+        if plan.way or any(step.gated for step in plan.steps):
+            return []
+        tops = [(f"layer {step.index}'s height", step.rim) for step in plan.steps]
+        tops.append((OVER_ALL, plan.steps[-1].rim))
+        return [Height(what, round(top, 4), round(layers.printed(top), 4)) for what, top in tops]
     found = printed_heights(spec, moulds.dimensions, plan.dimensions, -moulds.plate[0])
     exit = plan.dimensions.exit
     if exit and any(tool.made == "printed" for tool in plan.of_kind("tongue")):
@@ -107,7 +111,7 @@ def height_warnings(moulds: MouldSet) -> list[str]:
 def _better_layer(moulds: MouldSet) -> float | None:
     """Return the layer height nearest to the spec's with which every height comes out right; None if there is none."""
     printer, now = printer_of(moulds.spec), moulds.spec.moulds.layer_mm
-    if moulds.plan.pins:
+    if not moulds.plan.concentric:
         return None
     most = MOST_OF_NOZZLE * float(printer.nozzle_mm) if printer.nozzle_mm else now
     right = [
