@@ -157,6 +157,7 @@ def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said():
         "layer 1's cap": (1.25, 1.2),
         "layer 2's cap": (1.25, 1.2),
         "height over all": (4.61, 4.6),
+        "tongue's thickness": (0.4, 0.4),
     }
     assert off_layers(set_of("embedded")) == []
     sheet = procedure_text.to_markdown(procedure("encapsulating"))

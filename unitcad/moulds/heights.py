@@ -8,6 +8,7 @@ from msgspec import structs
 
 from unitcad.designs.dimensions import poured
 from unitcad.designs.printed import OVER_ALL, SHORT, Height, in_layers, printed_heights
+from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec, printer_of
 from unitcad.spec.layers import layers_of
@@ -75,7 +76,7 @@ class Miss:
 
 def missed(moulds: MouldSet) -> list[Miss]:
     """Return the heights that come out of the printer more than `MOST_ERROR` off, each with a remedy."""
-    wrong = [each for each in off_layers(moulds) if each.error > MOST_ERROR]
+    wrong = [each for each in off_layers(moulds) if each.error > MOST_ERROR + 1e-9]
     layer = _better_layer(moulds) if wrong else None
     first, height = (number(each, 3) for each in (moulds.spec.moulds.first_layer_mm, moulds.spec.moulds.layer_mm))
     found = []
@@ -83,7 +84,9 @@ def missed(moulds: MouldSet) -> list[Miss]:
         ways = []
         _, _, rest = each.what.partition(" ")
         if rest.endswith("'s cap"):
-            ways.append(f"layers.{int(rest.partition(chr(39))[0]) - 1}.cap_mm = {number(each.printed_mm, 3)}")
+            number_of = int(rest.partition("'")[0]) - 1
+            if cap := _better_cap(moulds, number_of, each):
+                ways.append(f"layers.{number_of}.cap_mm = {number(cap, 3)}")
         if layer:
             ways.append(f"moulds.layer_mm = {number(layer, 3)}")
         right = f"; {' or '.join(ways)} would print right" if ways else ""
@@ -106,6 +109,25 @@ def height_warnings(moulds: MouldSet) -> list[str]:
             f"moulds.first_layer_mm = {layer}, and as much in the slicer, or trim the film"
         )
     return said
+
+
+def _better_cap(moulds: MouldSet, layer: int, height: Height) -> float | None:
+    """Return the cap nearest to the spec's that is accepted and comes out right in these layers; None if none does."""
+    spec, design, step = moulds.spec, moulds.design, moulds.spec.moulds.layer_mm
+    for cap in sorted((height.printed_mm + n * step for n in (-1, 0, 1)), key=lambda cap: abs(cap - height.asked_mm)):
+        layers = list(spec.layers)
+        layers[layer] = structs.replace(layers[layer], cap_mm=round(cap, 4))
+        changed: Spec = structs.replace(spec, layers=tuple(layers))
+        dims = design.dimensions(changed)
+        try:
+            design.limits(changed, dims)
+            tools = in_layers(changed, poured(changed, dims))
+        except Refusal:
+            continue
+        made = {each.what: each for each in printed_heights(changed, dims, tools, -moulds.plate[0])}
+        if made[height.what].error <= MOST_ERROR:
+            return round(cap, 4)
+    return None
 
 
 def _better_layer(moulds: MouldSet) -> float | None:

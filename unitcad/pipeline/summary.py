@@ -35,7 +35,9 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
         across = " x ".join(number(width, 3) for width in widths(spec, cast))
         made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
-        yield f"{each}{across} mm across, {made or f'{high} mm high'}{circuit}{silicone}"
+        if made and circuit:
+            made += f", {high} with its circuit"
+        yield f"{each}{across} mm across, {made or f'{high} mm high{circuit}'}{silicone}"
     yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(read_json(folder / "casting.json"))

@@ -186,7 +186,8 @@ def _moulds(raw: RawSpec, design: Design) -> MouldsTable:
         heights["plinth_height_mm"] = round(layers.steps(lengths["plinth_height_mm"]), 9)
     if "slot_height_mm" in lengths:  # a tongue is printed flat, and as high as its slot
         nearest = layers.nearest(lengths["slot_height_mm"])
-        heights["slot_height_mm"] = nearest if nearest >= least - 1e-9 else layers.up(least)
+        thinnest = max(least, float(printer.least_feature_mm))
+        heights["slot_height_mm"] = nearest if nearest >= thinnest - 1e-9 else layers.up(thinnest)
     convert(heights, MouldsTable, "moulds")  # they may exceed their limits; the other lengths were checked before
     return structs.replace(raw.moulds, **{**lengths, **heights})
 
