@@ -17,7 +17,7 @@ from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.complement import films
 from unitcad.moulds.lid import films as skin_films
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.plan import Step
+from unitcad.moulds.plan import Step, tool_dimensions
 from unitcad.shape import cylinder, moved
 from unitcad.shape.extent import extent
 
@@ -48,11 +48,14 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
 
 
 def _cured(moulds: MouldSet, step: Step) -> Manifold:
-    """Return the unit's layer, of one whose tools' heights are moved to whole layers with these heights."""
-    tools = moulds.plan.dimensions
-    if not moulds.plan.concentric or tools == poured(moulds.spec, moulds.dimensions):
+    """Return the layer as it should cure: the unit's, or one as high as the whole layers of its tools make it."""
+    spec = moulds.spec
+    if moulds.origin or not moulds.plan.concentric:
         return moulds.solids[step.name]
-    return moulds.mesh_of(moulds.design.layers(moulds.spec, tools.scaled(1 / growth(moulds.spec)))[step.name])
+    tools = tool_dimensions(spec)
+    if tools == poured(spec, moulds.dimensions):
+        return moulds.solids[step.name]
+    return moulds.mesh_of(moulds.design.layers(spec, tools.scaled(1 / growth(spec)))[step.name])
 
 
 def _of_cavity(cavity: Cavity, least: float) -> MouldFinding:
