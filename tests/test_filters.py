@@ -12,6 +12,7 @@ from unitcad.catalogue.filters import keep, range_of, unit_of
 from unitcad.errors import Refusal, WrongArgument
 from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.spec import motor_of
 from unitcad.validation import from_data, read, warnings
 
 MOTORS = catalogue.motors()
@@ -137,9 +138,11 @@ def of(name, **more):
 @pytest.mark.parametrize("name", MOTORS)
 def test_each_motor_is_built_or_refused_for_what_it_is(name):
     motor, more = MOTORS[name], {}
-    if motor.outline and motor.outline.value == "square":
-        with pytest.raises(Refusal, match=r"motor\.diameter_mm: is required: .* is a square") as refused:
+    if motor.square:
+        with pytest.raises(Refusal, match=r"motor\.diameter_mm: must be at least 14\.1: .* is a square") as refused:
             of(name)
+        with pytest.raises(Refusal, match=r"motor\.diameter_mm = 14: must be at least 14\.1: "):
+            of(name, motor={"part": name, "diameter_mm": 14.0})
         assert refused.value.nearest == pytest.approx(math.sqrt(2) * float(motor.diameter_mm), abs=0.1)
         more["motor"] = {"part": name, "diameter_mm": refused.value.nearest}
     if motor.kind and motor.kind.value in ("piezo", "voice-coil"):
@@ -152,6 +155,7 @@ def test_each_motor_is_built_or_refused_for_what_it_is(name):
         return
     spec = of(name, **more)
     assert MouldSet(spec).plan.steps
+    assert motor_of(spec) == motor
     drawn = estimate_input(spec)
     assert drawn.drive == (motor.drive.value if motor.drive else "flat")
     if "motor" in more:

@@ -184,6 +184,11 @@ class Motor(Struct, frozen=True, kw_only=True):
         Value[Annotated[str, Meta(min_length=1, max_length=60, description="leads, such as wires or pads")]] | None
     ) = None
 
+    @property
+    def square(self) -> bool:
+        """Whether the can is square: its round cavity is wider than `diameter_mm`."""
+        return self.outline is not None and self.outline.value == "square"
+
 
 class Printer(Struct, frozen=True, kw_only=True):
     """A printer: its capability and the clearances that follow from it; all lengths mm, clearances per side."""

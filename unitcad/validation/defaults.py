@@ -138,10 +138,10 @@ def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     name = DEFAULT_MOTOR if given.part is None and set(sizes.values()) == {None} else given.part
     if name is not None:
         part = catalogue.choose("motor.part", name, catalogue.motors(raw.motors))
-        if part.outline and part.outline.value == "square" and sizes["diameter_mm"] is None:
-            side = float(part.diameter_mm)
-            limit = f"is required: the can of {name} is a square of {side:g} mm, and a cavity is round"
-            raise Refusal("motor.diameter_mm", None, limit, math.ceil(10 * math.sqrt(2) * side) / 10)
+        if part.square and (sizes["diameter_mm"] or 0.0) < (corners := math.sqrt(2) * float(part.diameter_mm)):
+            outline = f"the outline of {name} is a square of {number(part.diameter_mm, 3)} mm"
+            limit = f"must be at least {corners:.1f}: {outline}, and a cavity is round"
+            raise Refusal("motor.diameter_mm", sizes["diameter_mm"], limit, math.ceil(10 * corners) / 10)
         sizes = {field: float(getattr(part, field)) if size is None else size for field, size in sizes.items()}
     for field, size in sizes.items():
         if size is None:
