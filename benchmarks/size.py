@@ -28,7 +28,7 @@ from benchmarks import words
 ROOT = Path(__file__).parents[1]
 RELEASE = Path(__file__).with_name("release.toml")
 """Tokens of the last release."""
-ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
+ROOMS = ("accuracy", "arrays", "bodies", "lab", "search", "serve", "sweeps")
 SUMS = ("core", "total", "tests")
 """The core is the package without its rooms and without meshcheck."""
 MOST_GROWTH = 1.15

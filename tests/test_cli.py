@@ -42,13 +42,13 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path):
 
 def test_estimate_says_that_build_would_refuse_the_moulds(tmp_path):
     setting = "layers.0.cap_mm=500"
-    estimated = run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
+    estimated = run("estimate", "encapsulating", "--set", setting, "--model", "published", "--json")
     built = run("build", "encapsulating", "--set", setting, cwd=tmp_path)
     assert (estimated.returncode, built.returncode) == (0, 2)
     reason = built.stderr.removeprefix("error: ")
     assert reason.startswith("layers.0.cap_mm = ")
     assert estimated.stderr == f"warning: encapsulating: its moulds can't be made: {reason}"
-    assert json.loads(estimated.stdout)["models"]["divider"]
+    assert json.loads(estimated.stdout)["models"]["published"]
 
 
 WRONG = {
@@ -131,9 +131,9 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[4].startswith(f"out of the mould {out} after the print: 2 pours, ")
     assert lines[4].endswith(" at the bench; motor in 24 h 5 min later")
     assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[5]
-    assert lines[6:8] == manifest["estimate"]["lines"]
-    assert lines[8] == f"open {folder / 'bench.html'} to cast"
-    assert lines[9] == f"open {folder / 'report.html'}"
+    assert lines[6] == manifest["estimate"]["line"]
+    assert lines[7] == f"open {folder / 'bench.html'} to cast"
+    assert lines[8] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()
     without = run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
     assert not (Path(without.stdout.strip()) / "report.html").exists()

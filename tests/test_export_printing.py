@@ -77,7 +77,10 @@ def test_the_body_and_the_next_step_are_named_if_a_design_has_no_such_mesh(forma
     (tmp_path / "edge.py").write_text(EDGE)
     (tmp_path / "edge.toml").write_text(EDGE_SPEC)
     spec = load(tmp_path / "edge.toml", {"output.formats": [format]})
-    with pytest.raises(Refusal, match=r"single precision.*; draw them so that parts overlap, or are 0.01 mm") as caught:
+    place = "at x = 0, y = 0, z = [03] mm"
+    with pytest.raises(
+        Refusal, match=rf"single precision: .* {place}; draw them so that parts overlap, or are 0.01 mm"
+    ) as caught:
         build(spec, tmp_path / "out", only=("unit",))
     assert (caught.value.field, caught.value.value) == ("design", "edge.py:unit")
     assert "layer1: " in str(caught.value)

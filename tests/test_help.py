@@ -72,7 +72,7 @@ def test_commands_are_in_known_groups_and_each_line_is_its_helps_first():
 def test_a_table_in_a_pipe_has_its_full_width(capsys):
     from rich.table import Table
 
-    from unitcad.cli.output import console
+    from unitcad.cli.tables import console
 
     table = Table("unit", "remark")
     table.add_row("a" * 120, "b" * 120)

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 from packaging.requirements import Requirement
 
-from unitcad import errors
-from unitcad.errors import install_command
+import unitcad
+from unitcad.extras import install_command, install_step
 
 ROOT = Path(__file__).parent.parent
 
@@ -52,13 +52,13 @@ def test_an_address_is_installed_from_again(installed_from):
 
 def test_every_command_to_install_comes_from_the_one_function():
     """Messages that spell one fail where the package came from elsewhere."""
-    package = Path(errors.__file__).parent
+    package = Path(unitcad.__file__).parent
     spelled = {
         str(file.relative_to(package))
         for file in package.rglob("*.py")
         if re.search(r"pip[\"', ]+install|in a clone", file.read_text("utf-8"))
     }
-    assert spelled == {"errors.py"}
+    assert spelled == {"extras.py"}
 
 
 def test_a_folder_that_is_gone_is_a_clone_to_be_found(installed_from, tmp_path):
@@ -102,5 +102,5 @@ def test_readmes_command_installs_on_machines_without_a_step_kernel(where, has, 
     for kernel in kernels:
         assert kernel.marker.evaluate({"platform_machine": machine, "sys_platform": system}) == has, kernel
     monkeypatch.setattr("platform.machine", lambda: machine)
-    assert (errors.install_step() == install_command("step")) == has
-    assert has or errors.install_step() == f"it has no wheel for {machine}"
+    assert (install_step() == install_command("step")) == has
+    assert has or install_step() == f"it has no wheel for {machine}"

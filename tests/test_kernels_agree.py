@@ -8,9 +8,11 @@ import importlib
 import math
 from collections import Counter
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
+from manifold3d import Manifold, Mesh64
 from sample_bodies import LAYER1, QUARTER, all_bodies
 
 from unitcad.errors import UnitcadError
@@ -119,6 +121,33 @@ def test_a_face_that_turns_from_up_to_down_has_no_prism():
         occt.solids([Below(LEAVES["ball"], -4.0)])
     under = mesh.realise(Below(LEAVES["ball"], -4.0), 512).volume()
     assert under == pytest.approx(4 * math.pi * 9 + 2 / 3 * math.pi * 27, rel=1e-3)
+
+
+def test_what_lies_below_a_thread_is_the_integral_of_its_shadows():
+    """Three turns of one face lie over each other: its prism alone would be no solid."""
+    turns, sides, pitch = 3, 48, 2.0
+    section = np.array([(4.9, -0.7), (5.8, -0.15), (5.8, 0.15), (4.9, 0.7)])
+    angles = 2 * np.pi * np.arange(turns * sides + 1) / sides
+    x, y = np.cos(angles)[:, None] * section[:, 0], np.sin(angles)[:, None] * section[:, 0]
+    z = 1.2 + (pitch * np.arange(len(angles)) / sides)[:, None] + section[:, 1]
+    corners, k = np.stack([x, y, z], axis=-1).reshape(-1, 3), len(section)
+    here = (np.arange(len(angles) - 1)[:, None] * k + np.arange(k)).ravel()
+    after = (np.arange(len(angles) - 1)[:, None] * k + np.roll(np.arange(k), -1)).ravel()
+    ends = np.array([(0, 1, 2), (0, 2, 3)])
+    faces = np.concatenate(
+        [
+            np.stack([here, after, after + k], 1),
+            np.stack([here, after + k, here + k], 1),
+            ends[:, ::-1],
+            ends + k * (len(angles) - 1),
+        ]
+    )
+    helix = Manifold(Mesh64(corners, faces[:, ::-1].astype(np.uint64)))
+    assert helix.volume() > 0
+    solid = helix + Manifold.cylinder(9, 5, 5, sides)
+    levels = (np.arange(400) + 0.5) / 400 * 9
+    shadows = [solid.trim_by_plane((0, 0, 1), level).project().area() for level in levels]
+    assert mesh._below(solid, 0.0).volume() == pytest.approx(np.mean(shadows) * 9, rel=1e-5)
 
 
 def test_a_component_is_the_piece_that_holds_the_point():

@@ -16,7 +16,7 @@ import trimesh
 from tests.in_process import unitcad as run
 from tests.sample_bodies import LEADLESS
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import make as artifacts
+from unitcad.pipeline import unit_estimate as artifacts
 from unitcad.pipeline.write import build, replacing, subject
 from unitcad.validation import load, templates
 
@@ -65,7 +65,10 @@ def test_every_template_builds_and_passes_all_checks(name, tmp_path):
             manifold3d.Mesh(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32))
         )
         assert solid.status() == manifold3d.Error.NoError
-        assert mesh.bounds[0][2] == 0  # in print attitude, on the bed
+        if part["role"] == "tool":
+            assert mesh.bounds[0][2] == 0  # in print attitude, on the bed
+        else:  # at its place, as in the STEP file
+            assert mesh.bounds.ravel() == pytest.approx(part["bbox_mm"], abs=1e-5)
     for step in built.manifest["steps"]:
         assert step["cavity_volume_mm3"] == pytest.approx(
             step["layer_volume_mm3"] * np.prod(load(name).moulds.cavities), rel=1e-9

@@ -283,7 +283,7 @@ def test_arguments_that_can_not_be_are_refused(tmp_path):
         unitcad.estimate("encapsulating", frequency_hz=9000)
     with pytest.raises(Refusal, match=r"estimate\.models\.0 = 'own': unknown name"):
         unitcad.estimate("encapsulating", models=["own"])  # type: ignore[list-item]
-    with pytest.raises(Refusal, match=r"output\.formats\.0 = 'stp': unknown name"):
+    with pytest.raises(Refusal, match=r"formats = 'stp': unknown name"):
         unitcad.build("encapsulating", tmp_path, formats=["stp"])  # type: ignore[list-item]
     assert list(tmp_path.iterdir()) == []
 
@@ -319,4 +319,4 @@ def test_arguments_of_another_type_are_refused_in_one_sentence(call, words, tmp_
 def test_a_single_text_is_a_list_of_one(tmp_path):
     built = unitcad.build("encapsulating", tmp_path, formats="stl", only="unit", check=False)
     assert list(built.volumes) == ["layer1", "layer2", "motor", "fpcb"]
-    assert list(unitcad.estimate("encapsulating", models="published").edge) == ["published"]
+    assert list(unitcad.estimate("encapsulating", models="published").models) == ["published"]

@@ -8,8 +8,9 @@ import tomli_w
 from msgspec import structs
 
 from tests.sample_bodies import LEADLESS
+from unitcad.documents import parse_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_name
-from unitcad.spec import from_json, parse_toml, to_data, to_json, to_toml
+from unitcad.spec import from_json, to_data, to_json, to_toml
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.validation import from_data, load, override, read, templates, warnings
 

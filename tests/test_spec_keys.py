@@ -15,7 +15,9 @@ from unitcad.cache import MemoryStore, digest
 from unitcad.casting import views
 from unitcad.catalogue.entries import kinds_of
 from unitcad.errors import Refusal
-from unitcad.pipeline.make import Progress, Subject
+from unitcad.pipeline.make import make
+from unitcad.pipeline.result import Progress
+from unitcad.pipeline.unit import Unit
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
 from unitcad.spec.raw import OUTPUTS, RawSpec
@@ -195,7 +197,7 @@ def _before(base, checked):
 
 def _written(data, checked):
     """The content of each file that is written, as a hash, but for the spec itself; and what the checks find."""
-    product = Subject(from_data(data)).make(OUTPUTS, checked, _STORE, Progress())
+    product = make(Unit(from_data(data)), OUTPUTS, checked, _STORE, Progress())
     own = {path: digest(content) for path, content in product.own.items()}
     for path in ("spec.toml", "manifest.json"):
         del own[path]

@@ -19,7 +19,7 @@ from unitcad.checks import balance, draw, overlap
 from unitcad.checks.draw import blocked
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.mould_set import MouldSet, origin_of
 from unitcad.moulds.pieces import CAST, Removal, base_piece
 from unitcad.moulds.plan import Step
 from unitcad.shape import Common, box, cut, cylinder, exact_volume, moved, ring, rotated, union
@@ -71,7 +71,12 @@ def mould(slant, at, insert=INSERT):
         rim=TOP,
         top=TOP,
     )
-    made = MouldSet(spec, replace(plan, tools=(base_piece(cut(block(at), [room])),), steps=(step,)))
+    return planned(spec, replace(plan, tools=(base_piece(cut(block(at), [room])),), steps=(step,)))
+
+
+def planned(spec, plan):
+    """The set of a spec with other tools and pours."""
+    made = MouldSet(spec, origin=replace(origin_of(spec), plan=lambda: plan))
     made.__dict__["rib_spaces"] = Manifold()  # there is no cup to be centred
     return made
 
@@ -105,10 +110,8 @@ def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up()
     moulds = mould(slant, (3.0, 2.0))
     for way, comes in ((axis_of(slant), True), ((0, 0, 1), False), (axis_of((12.0, 24.0, 40.0)), False)):
         (step,) = moulds.plan.steps
-        ordered = MouldSet(
-            moulds.spec, replace(moulds.plan, steps=(replace(step, removals=(Removal(CAST, way),), inserts=()),))
-        )
-        ordered.__dict__["rib_spaces"] = Manifold()
+        steps = (replace(step, removals=(Removal(CAST, way),), inserts=()),)
+        ordered = planned(moulds.spec, replace(moulds.plan, steps=steps))
         found = list(draw.findings(ordered))
         assert [finding.ok for finding in found] == [comes]
 

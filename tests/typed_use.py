@@ -38,4 +38,4 @@ def use(out: Path) -> tuple[float, FileReport, float | None]:
     result: unitcad.CheckResult = unitcad.check(built.folder, printer="sla", select=["T"])
     first: FileReport = check_file(result.reports[0].path, Options())
     estimated: unitcad.EdgeEstimate = unitcad.estimate(spec, models=["rule"], frequency_hz=125)
-    return volume, first, estimated.edge["rule"]
+    return volume, first, estimated.level

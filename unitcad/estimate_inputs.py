@@ -5,19 +5,34 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from typing import Any
 
 from msgspec.structs import replace
 
-from unitcad.attenuation.edge.estimates import Layered, estimate, rounded, rounded_layered
+from unitcad.attenuation.edge.answer import Answer, answer
+from unitcad.attenuation.edge.contrast import place_of
+from unitcad.attenuation.edge.estimates import Layered, estimate, rounded_layered
 from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.edge.ranges import LabFit
-from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
-from unitcad.attenuation.layered import FractionalKelvinVoigt
-from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, motors, tissue
-from unitcad.designs import design_of, dimensions, no_estimate
+from unitcad.attenuation.inputs import (
+    EstimateInput,
+    Feature,
+    Geometry,
+    LayerShape,
+    Pad,
+    Quantity,
+    SiliconeLayer,
+    TissueLayer,
+    tissue_medium,
+)
+from unitcad.attenuation.layered import FractionalKelvinVoigt, UniformDisc
+from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, measurements, motors, tissue
+from unitcad.designs import design_of, dimensions
 from unitcad.errors import Refusal
+from unitcad.json_text import rounded
 from unitcad.spec import Spec
+from unitcad.spec.custom_code import is_custom
 from unitcad.validation.defaults import lab_fit
 
 _MOTOR_DENSITY = (4000.0, 5000.0, 6500.0)  # kg/m3: low, value, high
@@ -52,6 +67,11 @@ def estimate_spec(
     return data
 
 
+def answer_spec(spec: Spec, frequency_hz: float | None = None) -> Answer:
+    """Return the answer of a spec's estimate, without models, skin and scores. Raises `Refusal` as `estimate_spec`."""
+    return answer(estimate_input(spec, frequency_hz), fit_of(spec))
+
+
 def fit_of(spec: Spec) -> LabFit | None:
     """Return the lab's fit that a spec names."""
     return None if spec.estimate.fit_source is None else lab_fit(spec.estimate.fit_source)
@@ -72,9 +92,6 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
 
 def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
     """Return the same with the spec's layers as they are."""
-    passes = design_of(spec).passes
-    if passes is None:
-        raise Refusal("design", spec.design, f"has no estimate: {no_estimate()}")
     known = motors(spec.motors)
     motor = choose("motor.part", spec.motor.part, known) if spec.motor.part else None
     asked = spec.estimate.frequency_hz if frequency_hz is None else frequency_hz
@@ -82,10 +99,11 @@ def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
     if motor and motor.frequency_hz and frequency_hz is None and asked == float(motor.frequency_hz):
         frequency = _quantity(motor.frequency_hz)  # the motor's own value: keep its range
     silicones = materials(spec.materials)
+    below = tuple(tissue_layer(layer) for layer in tissue(spec.estimate.tissue, spec.tissue))
     return EstimateInput(
         name=spec.name,
         design=spec.design,
-        passes=passes,
+        passes=design_of(spec).passes or math.nan,
         diameter=spec.diameter_mm * 1e-3,
         geometry=_geometry(spec, motor_mass(spec, motor)),
         layers=tuple(
@@ -98,27 +116,49 @@ def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
             for i, layer in enumerate(spec.layers)
         ),
         tissue_name=spec.estimate.tissue,
-        tissue=tuple(tissue_layer(layer) for layer in tissue(spec.estimate.tissue, spec.tissue)),
+        tissue=below,
         frequency=frequency,
         amplitude=spec.estimate.amplitude_um * 1e-6,
         drive=spec.motor.drive,
         moduli=spec.estimate.moduli,
-        unread=tuple(_unread(spec)),
+        features=tuple(_features(spec, below)),
     )
 
 
-def _unread(spec: Spec) -> Iterator[str]:
-    """Yield the features of a spec that no model reads and no measured unit had."""
+def _features(spec: Spec, layers: tuple[TissueLayer, ...]) -> Iterator[Feature]:
+    """Yield the features of a spec that no measured unit had and no model reads."""
+    if is_custom(spec.design):
+        yield Feature("shape of its own")
+    if spec.motor.drive != "flat":
+        yield Feature("axial drive")
+    if softer := _other_tissue(layers, spec.diameter_mm * 1e-3, spec.motor.diameter_mm * 1e-3):
+        yield Feature("tissue", softer)
     if spec.skin_mm:
-        yield "film on the skin side"
+        yield Feature("film on the skin side", spec.skin_mm)
     if spec.motor.fill:
-        yield "silicone round the motor"
+        yield Feature("silicone round the motor")
     if spec.motor.lip_mm:
-        yield "lip"
+        yield Feature("lip", spec.motor.lip_mm)
     if spec.moulds.draft_deg:
-        yield "draft"
+        yield Feature("draft", spec.moulds.draft_deg)
     if spec.fpcb is None:
-        yield "wires in place of a circuit" if spec.wires else "no circuit"
+        yield Feature("wires in place of a circuit" if spec.wires else "missing circuit")
+
+
+@lru_cache(maxsize=64)
+def _other_tissue(layers: tuple[TissueLayer, ...], diameter: float, motor: float) -> float:
+    """Return |ln| of a tissue's compliance at a unit's edge over that of the tissue that stands for the phantom."""
+    usual = tuple(map(tissue_layer, tissue(measurements().unit.tissue)))
+    if layers == usual:
+        return 0.0
+    moved = [
+        tissue_medium(one).response(
+            UniformDisc(motor / 2.0), 2.0 * math.pi * measurements().unit.frequency_hz, [diameter / 2.0], rtol=1e-3
+        )
+        for one in (layers, usual)
+    ]
+    here, there = (abs(one.u_z[0]) for one in moved)
+    return abs(math.log(max(here, 1e-300) / there))
 
 
 def _geometry(spec: Spec, motor_mass: Quantity) -> Geometry:
@@ -154,6 +194,7 @@ def _quantity(value: Value, factor: float = 1.0) -> Quantity:
 
 def silicone_layer(material: Material, wall: float, frequency: Quantity, slow: bool) -> SiliconeLayer:
     """Return a layer of a silicone, its wall in m, at a frequency in Hz; `slow`: by its quasi-static modulus."""
+    place = place_of(material)
     return SiliconeLayer(
         material=material.name,
         thickness=wall,
@@ -161,6 +202,8 @@ def silicone_layer(material: Material, wall: float, frequency: Quantity, slow: b
         youngs_modulus=_quasistatic(material) if slow else _youngs_modulus(material, frequency),
         poisson_ratio=_quantity(material.poisson_ratio),
         tan_delta=_quantity(material.loss_factor),
+        place=place.at,
+        doubt=place.doubt,
     )
 
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
-import json
-import math
 import os
 import re
 import secrets
@@ -21,7 +19,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from unitcad.errors import UnitcadError
 
@@ -100,15 +98,6 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
         raise UnitcadError(f"{path}: not UTF-8 (byte {error.start})") from None
 
 
-def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> Any:
-    """Return the data of a JSON file, all of its numbers finite; else as `read`."""
-    text = read_text(path, largest=largest, links=links)
-    try:
-        return json.loads(text, parse_constant=_finite, parse_float=_finite)
-    except (ValueError, RecursionError) as error:
-        raise UnitcadError(f"{path}: not JSON: {error}") from None
-
-
 def sha256(path: str | os.PathLike[str]) -> str:
     """Return the SHA-256 of a file of any size, read in pieces. Raises UnitcadError if it can't be read."""
     found = hashlib.sha256()
@@ -165,8 +154,14 @@ def write(path: Path, content: bytes, *, sync: bool = False) -> None:
 def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
     """Open a new file that replaces what is at `path` when the block ends well, and is removed when it does not.
 
-    With `sync` content and name are on the disk when the block has ended. Raises OSError.
+    With `sync` content and name are on the disk when the block has ended. Raises OSError, and UnitcadError for a
+    device, a pipe or a folder at `path`, or behind a link there: root would replace /dev/null.
     """
+    there = None
+    with contextlib.suppress(OSError):
+        there = os.stat(path)
+    if there:
+        _expect_regular(str(path), there)
     with scratch(path.parent) as folder:
         fresh = folder / NEW
         with open(fresh, "xb") as file:
@@ -324,10 +319,3 @@ def _expect_regular(path: str, status: os.stat_result) -> None:
 def _sync(file: IO[bytes]) -> None:
     file.flush()
     os.fsync(file.fileno())
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text} is {'no number' if text.strip('-').isalpha() else 'out of range'}")
-    return value

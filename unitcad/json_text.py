@@ -1,12 +1,34 @@
-"""JSON as it is written: legible, and fast to make."""
+"""JSON out, and JSON as typed messages."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any
+from math import isfinite
+from typing import Any, TypeVar
 
 import msgspec
+
+from unitcad.documents import parse_json
+from unitcad.errors import UnitcadError, misfit
+
+T = TypeVar("T")
+
+
+def parse_message(content: bytes | str, kind: type[T], name: str = "the message") -> T:
+    """Return JSON as a `kind`. Raises UnitcadError for JSON that `parse_json` refuses, or of another kind."""
+    data = parse_json(content, name)
+    try:
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise UnitcadError(f"{name}: {misfit(error)}: {_why(error)}") from None
+
+
+def _why(error: Exception) -> str:
+    """Return msgspec's reason as the end of a sentence."""
+    text = str(error).removeprefix("JSON is malformed: ").replace("Input data was truncated", "it ends too early")
+    return text[:1].lower() + text[1:]
+
 
 _FAST = msgspec.json.Encoder()
 _PACKED = msgspec.msgpack.Encoder()
@@ -33,6 +55,22 @@ def json_bytes(data: Mapping[str, Any]) -> bytes:
     return b"{\n" + b",\n".join(lines) + b"\n}\n"
 
 
+def rounded_json(data: Any) -> str:
+    """Return JSON on indented lines, numbers to nine significant digits. Raises ValueError as `json_bytes`."""
+    if not all_finite(data):  # msgspec writes numbers that are not finite as null
+        raise ValueError("a number is not finite")
+    rounded = _NINE_DIGITS.decode(msgspec.json.encode(data))
+    return msgspec.json.format(msgspec.json.encode(rounded), indent=1).decode() + "\n"
+
+
+def _nine_digits(text: str) -> float:
+    """Return a number to nine significant digits; with its point or exponent a short text has no more."""
+    return float(text) if len(text) <= 10 else float(f"{float(text):.9g}")
+
+
+_NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
+
+
 def all_finite(value: Any) -> bool:
     """Tell whether every number in lists and dicts is finite."""
     try:
@@ -50,3 +88,22 @@ def all_finite(value: Any) -> bool:
         elif isinstance(one, float) and one - one != 0.0:
             return False
     return True
+
+
+SIGNIFICANT_DIGITS = 9
+
+
+def rounded(data: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
+    """Return `data` with its floats to `digits` significant digits, and None for floats that are not finite.
+
+    So the last bits of a platform do not show.
+    """
+    if isinstance(data, str):  # the most frequent
+        return data
+    if isinstance(data, float):
+        return float(f"{data:.{digits}g}") if isfinite(data) else None
+    if isinstance(data, dict):
+        return {key: rounded(value, digits) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):  # a union would be made anew at each call
+        return [rounded(value, digits) for value in data]
+    return data

@@ -1,22 +1,20 @@
 """The rooms: packages of unitcad that the core works without.
 
 The core names no room. A room states its additions in its `room.toml`: the functions of its commands as "module:name",
-and the kinds of TOML files that it knows.
+the kinds of TOML files that it knows, and a function that makes moulds (`moulds.plan`).
 """
 
 from __future__ import annotations
 
 import shlex
-import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import msgspec
-from msgspec import Struct, field
-
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal
 from unitcad.text import with_article
 
@@ -24,7 +22,8 @@ _CORE = "cli"
 """The package whose additions come first."""
 
 
-class Command(Struct, frozen=True, forbid_unknown_fields=True):
+@dataclass(frozen=True)
+class Command:
     """A command of the command line, with its line in `unitcad --help`."""
 
     run: str
@@ -35,7 +34,8 @@ class Command(Struct, frozen=True, forbid_unknown_fields=True):
     """Command lines at the end of its help."""
 
 
-class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
+@dataclass(frozen=True)
+class FileKind:
     """A kind of TOML file: `unitcad list PLURAL`, `unitcad schema NAME`, and a start for `unitcad init`."""
 
     name: str
@@ -53,22 +53,23 @@ class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
     """Whether `unitcad init` writes one."""
     keys: tuple[str, ...] = ()
     """The top-level keys by which a file is known to be of this kind."""
+    estimate: str = ""
+    """"module:name" of the function that prints the file's estimate, if it is not a unit's."""
     subject: str = ""
-    """"module:name" of the `pipeline.subjects.Compound` that the file describes, if it describes one."""
+    """"module:name" of the `pipeline.subject.Compound` that the file describes, if it describes one."""
     page: str = ""
     """The module with the file's part of the live page, if it has one."""
 
 
-class _Room(Struct, frozen=True, forbid_unknown_fields=True):
-    commands: dict[str, Command] = field(default_factory=dict)
-    files: tuple[FileKind, ...] = ()
-
-
 @cache
-def _rooms() -> list[_Room]:
+def _rooms() -> list[dict[str, Any]]:
     """Return the additions of the core, then those of the rooms by name."""
     paths = sorted(Path(__file__).parent.glob("*/room.toml"), key=lambda path: (path.parent.name != _CORE, path))
-    return [msgspec.convert(tomllib.loads(path.read_text("utf-8")), _Room) for path in paths]
+    return [read_toml(path) for path in paths]
+
+
+def _with_tuples(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def load(reference: str) -> Any:
@@ -77,14 +78,23 @@ def load(reference: str) -> Any:
     return getattr(import_module(module), name)
 
 
+@cache
 def commands() -> dict[str, Command]:
     """Return the commands of the command line by name."""
-    return {name: command for room in _rooms() for name, command in room.commands.items()}
+    every = (pair for room in _rooms() for pair in room.get("commands", {}).items())
+    return {name: Command(**_with_tuples(table)) for name, table in every}
 
 
+@cache
 def file_kinds() -> tuple[FileKind, ...]:
     """Return the kinds of TOML files."""
-    return tuple(kind for room in _rooms() for kind in room.files)
+    return tuple(FileKind(**_with_tuples(table)) for room in _rooms() for table in room.get("files", ()))
+
+
+@cache
+def mould_makers() -> tuple[str, ...]:
+    """Return "module:name" of each room's function that makes moulds for a body by more ways than the core's."""
+    return tuple(room["moulds"] for room in _rooms() if "moulds" in room)
 
 
 def kind_of(data: Mapping[str, object]) -> FileKind | None:

@@ -133,8 +133,8 @@ def some(words: Iterable[object], most: int = 10) -> str:
 
 
 def spaced(name: str) -> str:
-    """Return a body's name as it is read: "cup1" as "cup 1", which stays."""
-    return re.sub(r"(?<=[^\d\s])(?=\d+$)", " ", name)
+    """Return a body's name as it is read: "cup1" as "cup 1", which stays, and "cup1a" as "cup 1a"."""
+    return re.sub(r"(?<=[^\d\s])(?=\d+[a-d]?$)", " ", name)
 
 
 # As xml.sax.saxutils has them; importing that loads urllib, http and ssl.

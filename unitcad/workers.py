@@ -31,8 +31,6 @@ from unitcad.errors import UnitcadError
 
 START_S = 60.0
 """Seconds that a worker may take to start and to load its modules."""
-STAGES = "UNITCAD_STAGES"
-"""Environment variable: the text with which a command begins a line on standard error for each stage of its work."""
 LONGEST_LINE = 4000
 """Characters of a program's line that are passed on."""
 _CODE = "import sys; sys.path[:] = {path!r}; from unitcad.workers import _serve; _serve()"

@@ -21,7 +21,7 @@ from unitcad.attenuation.layered import (
     LossFactor,
     UniformDisc,
 )
-from unitcad.errors import missing_extra
+from unitcad.extras import missing_extra
 
 BITS = 128
 """The least precision; it is doubled where the balls of the result are too wide, which hold whatever it is."""

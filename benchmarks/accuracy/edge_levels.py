@@ -18,17 +18,8 @@ from benchmarks.accuracy.result import Cell, Plot, Promise, Result, Say, Summary
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.measurements import Timing, interleaved, timing
 from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, measured_table
-from unitcad.attenuation.edge.models import (
-    COMPARED,
-    MODELS,
-    Assessment,
-    Fit,
-    assess,
-    assessments,
-    edge_levels,
-    in_order,
-    stored,
-)
+from unitcad.attenuation.edge.models import COMPARED, MODELS, edge_levels, stored
+from unitcad.attenuation.edge.scoring import Assessment, Fit, assess, assessments, in_order
 from unitcad.attenuation.fem.unit import Setting, motion
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import UniformDisc
@@ -37,7 +28,7 @@ from unitcad.estimate_inputs import estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import default_template, load
 
-_TITLES = {"baseline": "baseline: four class means", "crossings": "crossings (k_t once or twice)"}
+_TITLES = {"baseline": "baseline: four class means"}
 _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circuit"
 _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 
@@ -85,8 +76,8 @@ def run(quick: bool, say: Say) -> Result:
         tuple((*_row(name, model), mark) for (name, model), mark in zip(models.items(), marks, strict=True)),
         "Best score with a unit left out first. The rule's constants, fitted when this runs: s "
         f"{stored()['rule']['s']:.4g}, q {stored()['rule']['q']:.4g}. Left out: each unit by constants fitted "
-        "without it. Directions: of twelve ratios, how many lie on the right side of 1. crossings and baseline take "
-        "the time of published. The finite elements' time is the median over their solutions, one run each; the "
+        "without it. Directions: of twelve ratios, how many lie on the right side of 1. baseline takes the "
+        "time of published. The finite elements' time is the median over their solutions, one run each; the "
         "others are of 21 runs.",
     )
     plot = Plot(
@@ -194,11 +185,11 @@ def _measured(table: MeasuredTable, unit: str) -> float:
 def _units_table(table: MeasuredTable, closed: dict[str, NineLevels], solved: dict[str, NineLevels]) -> Table:
     rows: list[tuple] = []
     for i, name in enumerate(table.names):
-        models = [level for model in ("rule", "published", "divider") for level in closed[model].levels[name].values()]
+        models = [level for model in ("rule", "published") for level in closed[model].levels[name].values()]
         rows.append((name, float(table.levels[i]), *models, *(levels.shown(name) for levels in solved.values())))
     return Table(
         "Each unit's edge level, motor = 1",
-        ("unit", "measured", "rule", "published", "divider", *solved),
+        ("unit", "measured", "rule", "published", *solved),
         tuple(rows),
         "The models carry constants from all nine levels, the finite elements none. The paper does not say in "
         "which shape a control was measured, so its finite-element level is the geometric mean of both, shown beside "

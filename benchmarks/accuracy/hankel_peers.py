@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import fft, integrate, interpolate, special
 
-from unitcad.errors import missing_extra
+from unitcad.extras import missing_extra
 
 Integrand = Callable[[np.ndarray], np.ndarray]
 END = 2e4

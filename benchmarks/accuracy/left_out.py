@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.measurements import EVERYTHING, REQUESTS, Timing, time_requests
-from unitcad.pipeline.make import Subject
+from unitcad.pipeline.unit import Unit
 from unitcad.validation import default_template, load, templates
 
 _LEFT_OUT = {
@@ -24,7 +24,7 @@ def run(quick: bool, say: Say) -> Result:
     times: dict[str, dict[str, Timing]] = {}
     for name in (default_template(),) if quick else templates():
         say(name)
-        times[name] = time_requests(Subject(load(name)), REQUESTS, 1 if quick else 5)
+        times[name] = time_requests(Unit(load(name)), REQUESTS, 1 if quick else 5)
     rows = tuple(row(request, list(times.values())) for request in REQUESTS if request != EVERYTHING)
     (saved, changed) = (rows[0][2], sum(int(str(one[-1]).split(" ")[0]) for one in rows))
     return Result(

@@ -13,8 +13,10 @@ from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.cache import MemoryStore
 from unitcad.checks import mould_checks
 from unitcad.errors import Refusal
-from unitcad.pipeline.make import Progress, Subject
+from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import FindingRecord
+from unitcad.pipeline.result import Progress
+from unitcad.pipeline.unit import Unit
 from unitcad.spec import Spec
 from unitcad.validation import default_template, from_data, load
 
@@ -87,7 +89,7 @@ def run(quick: bool, say: Say) -> Result:
 def _seconds(spec: Spec) -> tuple[float, list[FindingRecord]]:
     """Return the seconds that the mould checks of a spec take, and what they found. Raises Refusal."""
     stages = Progress()
-    manifest = Subject(spec).make(("unit", "moulds"), True, MemoryStore(), stages).manifest
+    manifest = make(Unit(spec), ("unit", "moulds"), True, MemoryStore(), stages).manifest
     return stages.seconds["mould checks"], manifest["mould_checks"]
 
 

@@ -88,7 +88,7 @@ def leave_one_out(name: str, table: MeasuredTable) -> list[Judged]:
         lead = lead_on(table.without(i), name)
         own = np.array(list(lead.constants.values()))
         centre = np.array(np.mean(COMPARED[name].logs(table.inputs[i], own)))
-        one = Predictive(lead.degrees_of_freedom, centre, np.array(lead.sigma), np.array(lead.sigma))
+        one = Predictive(lead.degrees_of_freedom, centre, np.array(lead.sigma))
         low, middle, high = (float(end) for end in one.range)
         level = float(table.levels[i])
         met = tuple(float(one.at_most(limit)) for limit in LEVELS)

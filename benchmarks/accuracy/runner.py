@@ -13,7 +13,9 @@ from pathlib import Path
 from benchmarks.accuracy import pages
 from benchmarks.accuracy.result import Result, Say, from_dict
 from unitcad import files
-from unitcad.errors import UnitcadError, missing_extra, unknown_name
+from unitcad.documents import read_json
+from unitcad.errors import UnitcadError, unknown_name
+from unitcad.extras import missing_extra
 
 MODULES = {
     "tessellation": "tessellation",
@@ -114,7 +116,7 @@ def read(folder: Path) -> list[Result]:
     """Return the results in a folder's accuracy.json, none without the file. Raises UnitcadError if it holds others."""
     file = folder / "accuracy.json"
     try:
-        return [from_dict(data) for data in files.read_json(file)["suites"]]
+        return [from_dict(data) for data in read_json(file)["suites"]]
     except files.NotThere:
         return []
     except (UnitcadError, ValueError, KeyError, TypeError) as error:

@@ -11,7 +11,7 @@ import numpy as np
 
 from unitcad.attenuation.edge.closed_form import wave_speed
 from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable
-from unitcad.attenuation.edge.models import Assessment
+from unitcad.attenuation.edge.scoring import Assessment
 from unitcad.catalogue import measurements
 
 

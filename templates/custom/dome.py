@@ -4,7 +4,7 @@ from unitcad.shape import Profile, Revolve
 
 
 def unit(spec):
-    """Draw silicone from the motor outwards; a flat top of `flat_mm` gives the mould an opening to pour into."""
+    """Draw silicone from the motor outwards; a flat top of `flat_mm` is an opening to pour into from above."""
     outer, motor, flat = spec.diameter_mm / 2, spec.motor, spec.parameters["flat_mm"] / 2
     inner, roof = motor.diameter_mm / 2, motor.thickness_mm
     top = roof + spec.layers[0].cap_mm

@@ -27,8 +27,8 @@ from unitcad.attenuation.inputs import Quantity
 from unitcad.attenuation.layered import LayeredMedium, Response
 from unitcad.estimate_inputs import estimate_input
 from unitcad.kernels.mesh import area_true
-from unitcad.pipeline.make import Subject
 from unitcad.pipeline.subjects import load_subject
+from unitcad.pipeline.unit import Unit
 from unitcad.shape import Revolve
 from unitcad.shape.profile import Profile
 from unitcad.validation import load
@@ -125,7 +125,7 @@ def test_the_specs_own_tolerance_is_among_the_five():
 def test_a_request_leaves_out_what_it_does_not_ask_for(monkeypatch):
     monkeypatch.setattr("unitcad.accuracy.measurements.interleaved", partial(interleaved, warm=False))
     spec = load("single-embedded", ["output.formats=['stl']"])
-    rows = {row["request"]: row for row in skipped_rows(Subject(spec))}
+    rows = {row["request"]: row for row in skipped_rows(Unit(spec))}
     left = {name: {one["output"] for one in row["skipped"]} for name, row in rows.items()}
     assert {"moulds", "estimate", "casting"} <= left["unit only"]
     assert left["STL, no checks"] >= {"mould checks", "mesh checks"}

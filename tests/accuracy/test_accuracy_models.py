@@ -10,7 +10,7 @@ from benchmarks.accuracy.level_scores import RANGE_HOLDS
 from benchmarks.accuracy.runner import read
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.attenuation.edge.measured import measured_table
-from unitcad.attenuation.edge.models import assessments
+from unitcad.attenuation.edge.scoring import assessments
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
 NAMES = measured_table().names

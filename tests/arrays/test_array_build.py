@@ -23,7 +23,8 @@ from unitcad.casting.steps import casting_summary, duration
 from unitcad.casting.views import picture_path, views
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
-from unitcad.pipeline.make import Progress
+from unitcad.pipeline.make import make
+from unitcad.pipeline.result import Progress
 from unitcad.pipeline.write import build as build_array
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered
@@ -73,6 +74,16 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder):
     assert [place["name"] for place in manifest["array"]["places"]] == ["A1", "A2"]
     assert all(finding["ok"] for finding in manifest["mould_checks"])
     assert manifest["check"]["findings"] == []
+
+
+def test_the_manifest_says_that_the_sheet_is_as_cast(folder):
+    """Its pockets are as narrow as cast; in the assembly they are stretched round the units."""
+    parts = {part["name"]: part for part in json.loads((folder / "manifest.json").read_text())["parts"]}
+    (sheet,) = [part for part in patch_parts(load_array("forearm-pockets", SMALL)) if part.name == "sheet"]
+    stretched = realise(sheet.body.shape, 96).volume()
+    assert parts["layer1"]["state"].startswith("as cast")
+    assert parts["layer1"]["volume_mm3"] > 1.005 * stretched
+    assert [name for name, part in parts.items() if "state" in part] == ["layer1"]
 
 
 def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up():
@@ -180,7 +191,7 @@ def test_arrays_that_differ_only_in_their_places_share_no_moulds_in_a_store():
     store, trays = MemoryStore(), []
     for pitch in (20, 22):
         array = load_array("forearm-pockets", [*SMALL, f"layout.pitch_mm={pitch}"])
-        (base, *_) = Arrayed(array).make(("moulds",), False, store, Progress()).manifest["parts"]
+        (base, *_) = make(Arrayed(array), ("moulds",), False, store, Progress()).manifest["parts"]
         trays.append(base["bbox_mm"][3] - base["bbox_mm"][0])
     assert trays[1] - trays[0] == pytest.approx(2)
 

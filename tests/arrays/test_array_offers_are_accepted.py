@@ -5,7 +5,7 @@ import pytest
 from tests.robustness.test_offers_are_accepted import check_each_field, numbers
 from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.patch import patch_moulds
-from unitcad.spec.toml import read_toml
+from unitcad.documents import read_toml
 
 
 def tools_of(data):

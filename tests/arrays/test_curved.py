@@ -61,7 +61,7 @@ def test_each_unit_stands_where_its_arc_is():
     """The middle of its foot touches the limb, at the angle that its place has on the sheet's middle."""
     moulds = sleeve()
     middle = R + (moulds.array.sheet.low + moulds.array.sheet.high) / 2
-    motors = {body.name: moulds.mesh(body) for body in moulds.laid_later if body.kind == "motor"}
+    motors = {body.name: moulds.mesh(body) for body in moulds.plan.laid_later if body.kind == "motor"}
     for place in moulds.array.places:
         x0, y0, z0, x1, y1, z1 = motors[f"{place.name}-motor"].bounding_box()
         x, y, z = (x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2 + R

@@ -43,7 +43,8 @@ def test_json_is_the_data_and_several_are_compared_with_the_first(tmp_path):
     assert [one["array"] for one in both["arrays"]] == ["forearm-pockets", "hex-19"]
     (ratio,) = both["ratios"]
     one, other = both["arrays"]
-    assert ratio["sum"] == pytest.approx(other["worst"]["sum"]["value"] / one["worst"]["sum"]["value"], rel=1e-5)
+    phases = [each["worst"]["worst_phases"]["value"] for each in (other, one)]
+    assert ratio["worst_phases"] == pytest.approx(phases[0] / phases[1], rel=1e-5)
     assert ratio["nearest_centre"] == pytest.approx(1, abs=1e-4)
     _, text, _ = run(NINE, "hex-19")
     assert "hex-19 over forearm-pockets: nearest neighbour x 1.00" in text
@@ -53,7 +54,7 @@ def test_a_ratio_with_a_single_unit_is_none():
     one = load_array(NINE, ["layout.columns=1", "layout.rows=1", "sheet.strap_slot_mm=[3, 8]"])
     (ratio,) = ratios([crosstalk(one), crosstalk(load_array(NINE))])
     assert ratio["nearest_centre"] is None
-    assert ratio["sum"] is None
+    assert ratio["in_phase"] is None
 
 
 @pytest.mark.parametrize(

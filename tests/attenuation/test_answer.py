@@ -1,4 +1,4 @@
-"""What leads an estimate: two lines with level, range and the paper's model; the details; levels in per cent."""
+"""The answer: one typed object, its one line, what widens or voids its range, and how two answers are compared."""
 
 import json
 import re
@@ -8,63 +8,93 @@ import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
-from unitcad.attenuation.edge.estimates import percent
-from unitcad.attenuation.edge.models import assessments, stored
+import unitcad
+from unitcad.attenuation.edge.answer import WIDEST
+from unitcad.attenuation.edge.scores import scores
+from unitcad.attenuation.edge.scoring import assessments, choice
+from unitcad.attenuation.edge.words import ANY_FORM, NO_EFFECT, compared, details, first_line, lines, percent
 from unitcad.cli import app
 from unitcad.designs import design_of
-from unitcad.estimate_inputs import estimate_spec
-from unitcad.validation import load, templates
+from unitcad.estimate_inputs import answer_spec, estimate_spec
+from unitcad.spec import to_toml
+from unitcad.validation import from_data, load, read, templates
 
 
 def lead(spec, *changes):
-    return estimate_spec(load(spec, changes))["answer"]
+    return answer_spec(load(spec, changes))
 
 
-def test_a_unit_that_was_measured_leads_with_the_measurement_and_a_range():
+def told(one, layers=2):
+    return list(details(one, layers, "small-strain", {}))
+
+
+def test_the_first_line_of_a_measured_unit():
     found = lead("encapsulating")
-    assert found["headline"] == (
-        "5.2 % of the motor's amplitude at the edge (measured in the paper). "
-        f"Expect {100 * found['p10']:.2g} to {100 * found['p90']:.2g} %."
+    assert first_line(found) == (
+        "Level at the edge: 4.6 % of the motor's amplitude (3.1 to 6.8). Measured in the paper for this unit: 5.2 %."
     )
-    source = " By a rule fitted to nine measured levels; the paper states neither their surface nor axis."
-    assert found["lines"][0] == found["headline"] + source
-    assert [one["level"] for one in found["measured"]] == [0.0517, 0.0458]
-    assert found["level"] == 0.0517
-    assert "Also measured: 4.58 %." in found["details"]
+    assert [one.level for one in found.measured] == [0.0517, 0.0458]
+    assert "Also measured: 4.58 %." in told(found)
+    assert found.wider == ()
 
 
-def test_a_unit_that_nobody_measured_names_the_nearest():
-    found = lead("embedded", "layers.0.wall_mm=1.3")
-    assert found["measured"] == []
-    assert found["level"] == found["p50"]
-    assert found["headline"].startswith(f"{100 * found['p50']:.2g} % of the motor's amplitude at the edge. Expect ")
-    assert found["lines"][0].endswith("Nearest measured: embedded E10/D30, 15.6 %.")
-    assert any("This unit differs in walls: the range is wider for it" in line for line in found["details"])
+def test_every_place_prints_the_one_object(tmp_path):
+    """Command, JSON, build, manifest, Python, and the row of a batch."""
+    one = lead("embedded", "layers.0.wall_mm=1.3")
+    line, numbers = first_line(one), [one.level, one.low, one.high]
+    run = CliRunner().invoke
+    changed = ["embedded", "--set", "layers.0.wall_mm=1.3"]
+    assert line in run(app, ["estimate", *changed]).output
+    data = json.loads(run(app, ["estimate", *changed, "--json"]).output)["answer"]
+    assert data["line"] == line
+    assert [data[key] for key in ("level", "low", "high")] == pytest.approx(numbers, rel=1e-8)
+    shown = run(app, ["build", *changed, "--only", "estimate", "-o", str(tmp_path)]).output
+    assert any(line in each for each in shown.splitlines())
+    (manifest,) = (json.loads(path.read_text("utf-8")) for path in tmp_path.rglob("manifest.json"))
+    assert manifest["estimate"]["line"] == line
+    assert [manifest["estimate"][key] for key in ("level", "low", "high")] == pytest.approx(numbers, rel=1e-8)
+    python = unitcad.estimate("embedded", set={"layers.0.wall_mm": 1.3})
+    assert str(python) == line
+    assert line in repr(python)
+    assert [python.level, python.low, python.high] == pytest.approx(numbers, rel=1e-8)
+    assert python.measured is None
+    assert unitcad.estimate("embedded").measured == 0.156
 
 
-def test_the_second_line_is_the_papers_model_with_its_error_and_the_baselines():
-    found, scores = lead("embedded"), assessments()
-    data = estimate_spec(load("embedded"))
-    for name in ("published", "corrected"):
-        level = data["models"][name]["edge_level"]["value"]
-        assert found["analytic"][name]["value"] == level
-        assert f"{100 * level:.2g} %" in found["lines"][1]
-    published, baseline = (scores[name].leave_one_out.geometric_mean for name in ("published", "baseline"))
-    assert f"error: factor {published:.2f}; baseline, the means of four classes: {baseline:.2f}." in found["lines"][1]
-    assert "its path of u_z through the walls" in found["lines"][1]
+def test_the_level_is_the_rules_next_to_the_measurement():
+    """A wall of 1.251 mm in place of 1.25 moves nothing: the measurement never replaces the level."""
+    exact, nearly = lead("embedded"), lead("embedded", "layers.0.wall_mm=1.251")
+    assert nearly.level == pytest.approx(exact.level, rel=1e-3)
+    assert (exact.measured[0].level, nearly.measured) == (0.156, ())
+
+
+def test_the_lines_of_an_estimate():
+    found, score = lead("embedded"), assessments()["published"].leave_one_out.geometric_mean
+    level, source, analytic = lines(found)
+    assert level == first_line(found)
+    assert source == (
+        "The level is that of a rule fitted to 9 measured units. It misses a unit that it was not fitted to by "
+        f"{ANY_FORM}."
+    )
+    published = 100 * estimate_spec(load("embedded"))["models"]["published"]["edge_level"]["value"]
+    error = f"a factor of {score:.1f}"
+    assert analytic == f"The paper's analytic model gives {published:.2g} %. It misses a measured unit by {error}."
+    scored = [assessments()[name].leave_one_out.geometric_mean for name in ("rule", "baseline")]
+    scored.append(choice().score.geometric_mean)
+    assert f"a factor of about {min(scored):.1f} to {max(scored):.1f}, whatever the form" == ANY_FORM
 
 
 def test_the_answer_does_not_depend_on_the_models_that_are_asked_for():
-    every, one = lead("embedded"), lead("embedded", 'estimate.models=["divider"]')
+    every, one = (
+        estimate_spec(load("embedded", change))["answer"] for change in ([], ['estimate.models=["published"]'])
+    )
     assert one == every
 
 
-def test_the_rules_error_and_how_often_its_ranges_held_are_in_the_details():
-    found, best = lead("embedded"), assessments()["rule"].leave_one_out
-    assert (found["model"], found["coverage"]) == ("rule", 8)
-    assert (found["typical_error"], found["worst_error"]) == pytest.approx((best.geometric_mean, best.worst), rel=1e-6)
-    assert "baseline: 1.3" in found["details"][0]
-    assert "Coverage of the 80 % range: 8 of 9" in found["details"][1]
+def test_a_build_shows_the_level_alone(tmp_path):
+    shown = CliRunner().invoke(app, ["build", "embedded", "--only", "estimate", "-o", str(tmp_path)]).output
+    assert first_line(lead("embedded")) in shown
+    assert "analytic" not in shown
 
 
 def test_how_many_ranges_held_is_counted_again():
@@ -81,36 +111,45 @@ def test_how_many_ranges_held_is_counted_again():
         others = np.delete(np.arange(9), i)
         scale = np.sqrt(sum(out(others, j) ** 2 for j in others) / 7)
         held += abs(out(np.arange(9), i)) <= scale * stats.t.ppf(0.9, 6)
-    assert lead("embedded")["coverage"] == held
+    assert lead("embedded").source.coverage == held == 8
+    assert "Coverage of the 80 % range: 8 of 9" in told(lead("embedded"))[1]
 
 
 def test_one_material_units_are_said_to_be_one_level():
-    found = lead("single-embedded")
-    assert any("same level; 39.5, 45.2 and 60.2 % were measured" in line for line in found["details"])
-    assert not any("same level" in line for line in lead("embedded")["details"])
+    assert any("same level; 39.5, 45.2 and 60.2 % were measured" in line for line in told(lead("single-embedded"), 1))
+    assert not any("same level" in line for line in told(lead("embedded")))
 
 
-def test_without_a_level_the_reason_leads():
-    found = lead("embedded", "layers.0.material=ecoflex-00-50")
-    assert (found["model"], found["level"], found["p10"]) == (None, None, None)
-    assert found["lines"][0].startswith("Not known: ecoflex-00-50 youngs_modulus")
-    assert found["lines"][1].startswith("The paper's analytic model gives no number: ecoflex-00-50")
+def test_a_silicone_without_any_modulus_has_no_level():
+    data = read("embedded")
+    data["materials"] = {"blend": {**RAW, "status": "spec", "source": "made up"}}
+    data["layers"][0]["material"] = "blend"
+    found = answer_spec(from_data(data))
+    assert (found.level, found.low, found.high) == (None, None, None)
+    assert first_line(found) == "No level at the edge: no modulus of blend is known."
+    assert lines(found)[1].startswith("The paper's analytic model gives no number: blend")
 
 
-def test_a_modulus_that_is_a_range_gives_a_range_alone():
-    found = lead("embedded", "layers.0.material=ecoflex-00-30")
-    assert found["level"] is None
-    assert re.match(r"Expect \d\d to \d\d % of the motor's", found["lines"][0])
-    s, q = stored()["rule"].values()
-    assert found["p10"] < s * q
-    assert found["p90"] > s  # the range holds both ends
+RAW = {
+    "density_g_cm3": 1.0, "mixed_viscosity_cps": 1000, "pot_life_min": 30, "cure_h": 4, "shore": "00-20",
+    "modulus_100pct_kpa": 50, "tensile_mpa": 1.0, "elongation_pct": 800, "casting_floor_mm": 1.0,
+    "poisson_ratio": 0.49, "loss_factor": 0.2, "mix_ratio": 1.0,
+}  # fmt: skip
 
 
-def test_a_range_above_every_measured_level_says_so():
+def test_a_silicone_with_a_slow_pull_alone_has_a_wider_range():
+    known, slow = lead("embedded"), lead("embedded", "layers.0.material=ecoflex-00-50")
+    assert slow.high / slow.low > 1.1 * known.high / known.low
+    assert "silicones" in slow.wider
+    assert lines(slow)[2].startswith("The paper's analytic model gives no number: ecoflex-00-50")
+
+
+def test_a_range_beyond_every_measured_level_names_the_highest():
     found = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10")
-    assert found["p90"] > 0.671
-    assert "(above the highest level that the paper prints as a number, 67 %)" in found["headline"]
-    assert "no measured level" not in lead("embedded")["headline"]
+    assert found.high > 0.671
+    assert found.above == 0.671
+    assert "The highest measured level is 67 %." in first_line(found)
+    assert lead("embedded").above is None
 
 
 def test_what_is_next_to_nothing_is_not_called_nothing():
@@ -118,7 +157,7 @@ def test_what_is_next_to_nothing_is_not_called_nothing():
     assert percent(0.0) == "below 0.01 %"
     assert percent(0.0204) == "2.0 %"
     far = lead("encapsulating", "estimate.frequency_hz=1000")
-    assert not any(re.search(r"\b0 %|e-\d", line) for line in [*far["lines"], *far["details"]])
+    assert not any(re.search(r"\b0 %|e-\d", line) for line in [*lines(far), *told(far)])
 
 
 @pytest.mark.parametrize("name", templates())
@@ -126,47 +165,129 @@ def test_no_sentence_has_a_fraction_for_a_level_or_a_long_number(name):
     if design_of(load(name)).passes is None:
         pytest.skip("no model of this design")
     found = lead(name)
-    for line in [*found["lines"], *found["details"]]:
+    for line in [*lines(found), *told(found)]:
         assert not re.search(r"\d\.\d{3}|\d\d\.\d\d|e-\d", line), line
         assert not re.search(r"\b0\.0[02-9]", line), line
 
 
-def test_the_command_leads_with_two_lines_and_keeps_the_rest_for_details():
+def test_the_command_leads_with_the_lines_and_keeps_the_rest_for_details():
     run = CliRunner().invoke
     plain = run(app, ["estimate", "embedded"]).output
     assert len(plain.splitlines()) < 10
-    found = lead("embedded")
-    for line in found["lines"]:
+    for line in lines(lead("embedded")):
         assert line in plain
     full = run(app, ["estimate", "embedded", "--details"]).output
-    tables = ("error against the table", "|u| of the skin, % of that", "input + 1 %", "% of an", "leave-one-class-out")
-    for words in tables:
+    for words in (
+        "error against the table",
+        "|u| of the skin, % of that",
+        "input + 1 %",
+        "% of an",
+        "leave-one-class-out",
+    ):
         assert words not in plain
         assert words in full
-    for line in found["details"]:
+    for line in told(lead("embedded")):
         assert line not in plain
         assert line in full
 
 
-def test_a_build_ends_with_the_two_lines(tmp_path):
-    shown = CliRunner().invoke(app, ["build", "embedded", "--only", "estimate", "-o", str(tmp_path)]).output
-    manifest = json.loads(next(tmp_path.rglob("manifest.json")).read_text("utf-8"))
-    assert manifest["estimate"]["lines"] == lead("embedded")["lines"]
-    for line in manifest["estimate"]["lines"]:
-        assert any(line in one for one in shown.splitlines())
-
-
-def test_a_unit_too_far_from_the_measured_ones_gets_no_level():
+def test_a_unit_too_far_from_the_measured_ones_gets_a_range_and_no_level():
     far = lead("embedded", "diameter_mm=300")
-    assert far["too_far"]
-    assert far["level"] is None
-    assert far["headline"].startswith("No level: this unit is too far from the measured ones")
-    assert lead("three-layer")["level"] is not None
+    assert far.level is None
+    assert far.high > WIDEST * far.low
+    assert first_line(far).startswith("No level at the edge: the range is too wide, ")
+    assert "Wider range: no measured unit had its diameter." in first_line(far)
+    assert lead("three-layer").level is not None
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        (["skin_mm=1"], "film on the skin side"),
+        (["motor.lip_mm=0.5"], "lip"),
+        (["motor.fill=true"], "silicone round the motor"),
+        (["moulds.draft_deg=3"], "draft"),
+        (["estimate.tissue=gel-50kpa"], "tissue"),
+        (["motor.drive=axial"], "axial drive"),
+        (["diameter_mm=16"], "diameter"),
+        (["layers.0.wall_mm=1.5"], "walls"),
+        (["layers.0.cap_mm=1.5"], "caps"),
+        (["estimate.frequency_hz=200"], "frequency"),
+    ],
+)
+def test_what_widens_a_range_stands_in_the_first_line(changes, name):
+    plain, found = lead("encapsulating"), lead("encapsulating", *changes)
+    assert name in found.wider
+    assert re.search(rf"Wider range: no measured unit had its [^.]*{name}", first_line(found))
+    assert found.high / found.low > plain.high / plain.low
+    assert found.measured == ()
+
+
+def test_features_widen_as_much_as_they_do():
+    """A thin film does little, an axial drive leaves no level; both enter by one mechanism, without a step."""
+    widths = [
+        np.log(one.high / one.low)
+        for one in (lead("encapsulating", f"skin_mm={mm}") for mm in (0.3, 0.5, 1.0, 2.0, 4.0))
+    ]
+    assert np.all(np.diff(widths) > 0)
+    assert widths[0] < 1.02 * np.log(lead("encapsulating").high / lead("encapsulating").low)
+    assert lead("encapsulating", "motor.drive=axial").level is None
+    own = ["tissue.mine.skin.density_kg_m3=1100", "tissue.mine.skin.poisson_ratio=0.49", "estimate.tissue=mine"]
+    softer = lead("encapsulating", *own, "tissue.mine.skin.youngs_modulus_kpa=30")
+    stiffer = lead("encapsulating", *own, "tissue.mine.skin.youngs_modulus_kpa=3e8")
+    assert stiffer.level is None
+    assert softer.level is not None
+
+
+@pytest.mark.parametrize("name", ["dome", "strap-lugs"])
+def test_a_custom_design_has_no_level_by_the_same_mechanism(name):
+    spec = load(f"custom/{name}")
+    found = answer_spec(spec)
+    assert first_line(found).startswith("No level at the edge: the rule knows embedded and encapsulating units only.")
+    shown = CliRunner().invoke(app, ["estimate", f"custom/{name}"])
+    assert first_line(found) in shown.output
+    assert shown.exit_code == 0
+    data = estimate_spec(spec)
+    json.dumps(data, allow_nan=False)
+    assert data["layered"]["drives"]
+    assert all(block["edge_level"]["low"] is None for block in data["models"].values())
+
+
+def test_a_custom_design_that_states_its_passes_has_a_wider_range(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from dataclasses import replace\nfrom unitcad.designs.encapsulating import DESIGN\n"
+        "OWN = replace(DESIGN, name='own', tooling='complement')\n"
+    )
+    text = to_toml(load("encapsulating")).replace('design = "encapsulating"', 'design = "own.py:OWN"')
+    (tmp_path / "own.toml").write_text(text)
+    found, shipped = answer_spec(load(str(tmp_path / "own.toml"))), lead("encapsulating")
+    assert "shape of its own" in found.wider
+    assert found.measured == ()
+    assert found.high / found.low > 2 * shipped.high / shipped.low
 
 
 def test_what_the_paper_prints_of_a_unit_without_a_level_is_in_the_first_line():
     """187.7 % of one of the controls, 39.5 to 60.2 %."""
     stiff = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=dragon-skin-10-medium")
-    assert "187.7 % of a control that it does not name for this unit: 74 to 110 %." in stiff["lines"][0]
+    assert "The paper prints 187.7 % of a control that it does not name: 74 to 110 %." in first_line(stiff)
     soft = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10")
-    assert "The paper states of this unit: amplifies slightly more than D30/D10." in soft["lines"][0]
+    assert "The paper states of this unit: amplifies slightly more than D30/D10." in first_line(soft)
+
+
+def test_two_answers_are_compared_model_against_model():
+    base = lead("encapsulating")
+    for change in ("layers.0.wall_mm=1.5", "diameter_mm=16", "motor.part=VC0720B001F"):
+        other = lead("encapsulating", change)
+        assert compared(other, base).endswith(NO_EFFECT), change
+    assert compared(lead("embedded"), base) == "15 % against 4.6 %: a factor of 3.3"
+    assert compared(lead("encapsulating", "motor.drive=axial"), base) == "not compared: a level is not known"
+    shown = CliRunner().invoke(app, ["estimate", "encapsulating", "embedded"]).output
+    assert "embedded, compared with encapsulating: 15 % against 4.6 %: a factor of 3.3" in shown
+
+
+def test_the_stored_scores_lead_to_the_same_answer_as_scores_made_anew():
+    found = scores()
+    assert found.lead.model == "rule"
+    assert found.models["rule"].leave_one_out.geometric_mean == pytest.approx(
+        assessments()["rule"].leave_one_out.geometric_mean, rel=1e-5
+    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.contrast import unit_of_scale
 from unitcad.attenuation.edge.level import changed, nominal, sensitivities, stack_inputs
 from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
 from unitcad.estimate_inputs import estimate_input, estimate_spec
@@ -60,11 +61,13 @@ def test_slopes_are_those_of_specs_that_were_changed(name, model):
 
 
 def test_slopes_by_formula():
-    """The divider: x/(1 + x) with x = kappa n E2/E1. published: the exponents along the walls."""
+    """The rule: n ln q over the unit of the scale, between equal silicones. published: the exponents along the walls."""
     blocks = estimate_spec(load("encapsulating"))["models"]
-    x = stored()["divider"]["kappa"] * 2 * 355 / 15
-    slopes = {"layers.0.youngs_modulus_kpa": x / (1 + x), "layers.1.youngs_modulus_kpa": -x / (1 + x)}
-    assert blocks["divider"]["sensitivities"]["by"] == pytest.approx(slopes, abs=1e-4)
+    between = ["layers.0.material=dragon-skin-10-medium", "layers.1.material=dragon-skin-30"]
+    slope = -2 * math.log(stored()["rule"]["q"]) / unit_of_scale()
+    slopes = {"layers.0.youngs_modulus_kpa": slope, "layers.1.youngs_modulus_kpa": -slope}
+    own = estimate_spec(load("encapsulating", between))["models"]["rule"]["sensitivities"]["by"]
+    assert own == pytest.approx(slopes, abs=1e-4)
     paper = blocks["published"]["sensitivities"]["by"]
     (exponents,) = cf.exponents(nominal(estimate_input(load("encapsulating"))))
     assert [paper[f"layers.{i}.wall_mm"] for i in (0, 1)] == pytest.approx([-e for e in exponents], abs=1e-4)
@@ -80,7 +83,7 @@ def test_each_input_is_seen_or_named_as_not_seen(name):
         assert {*seen["by"], *seen["no_effect"]} == set(changed(estimate_input(spec)))
         assert not set(seen["by"]) & set(seen["no_effect"])
     models = estimate_spec(spec)["models"]
-    assert not models["rule"]["sensitivities"]["by"]  # beyond the measured ratio of moduli, or one layer alone
+    assert not models["rule"]["sensitivities"]["by"]  # beyond the measured pairs, or a single layer
     assert "layers.0.wall_mm" in models["published"]["sensitivities"]["by"]
 
 

@@ -62,7 +62,7 @@ def test_views_name_pieces_that_there_are(source, planned):
         step.name for step in plan.steps
     }
     for name, view in views(moulds).items():
-        known = {body.name for body in (*moulds.unit, *moulds.laid_later)} if view.group == "unit" else tools
+        known = {body.name for body in (*moulds.unit, *moulds.plan.laid_later)} if view.group == "unit" else tools
         assert {part.name for part in view.parts} <= known, name
 
 
@@ -322,7 +322,7 @@ def _motor_as_said(moulds, step, view):
         assert view.turned
     if "skin side down" in text or "from above" in text:
         assert not view.turned
-    bodies = {body.name: body for body in (*moulds.unit, *moulds.laid_later) if body.kind == "motor"}
+    bodies = {body.name: body for body in (*moulds.unit, *moulds.plan.laid_later) if body.kind == "motor"}
     motors = [bounds(moulds.mesh(body)) for body in bodies.values()]
     assert motors
     placed = [part for part in view.parts if part.name in bodies]

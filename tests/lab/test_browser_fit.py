@@ -38,7 +38,7 @@ def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit, fitte
     assert table.is_visible()  # under "How sure?", not among the folded tables
     rows = [row.split("\t") for row in table.locator("tbody tr").all_inner_texts()]
     assert "(baseline)" in rows[-1][0]
-    for name in ("rule", "published", "corrected", "divider"):
+    for name in ("rule", "published", "corrected"):
         one = fitted.fit.model[name]
         row = next(row for row in rows if f"({name})" in row[0])
         assert float(row[1]) == pytest.approx(one.leave_one_out, rel=6e-3)

@@ -149,7 +149,7 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
     )
     tissue = tomllib.loads((folder / "tissue.toml").read_text("utf-8"))["tissue"]
     spec = load("embedded", {"tissue": tissue, "estimate.tissue": "phantom-skin"})
-    layered = estimate_spec(spec, ["divider"])["layered"]
+    layered = estimate_spec(spec, ["rule"])["layered"]
     assert layered["tissue"] == "phantom-skin"
     axial = layered["drives"]["axial"]
     value = axial["u_z"]["value"]

@@ -178,10 +178,33 @@ def _models():
         ("matid-color.3mf", "P019", package(model_xml(
             colors + '<m:compositematerials id="8" matid="6" matindices="0"><m:composite values="1"/>'
             + "</m:compositematerials>" + obj))),
+        ("lattice.3mf", "P021", package(model_xml(lattice('<b:beam v1="0" v2="1"/>')))),
+        ("lattice-index.3mf", "P011", package(model_xml(lattice('<b:beam v1="0" v2="8"/>')))),
+        ("lattice-same.3mf", "P017", package(model_xml(lattice('<b:beam v1="3" v2="3"/>')))),
+        ("lattice-radius.3mf", "P017", package(model_xml(lattice('<b:beam v1="0" v2="1" r2="-1"/>')))),
+        ("lattice-set.3mf", "P011", package(model_xml(lattice('<b:beam v1="0" v2="1"/>', '<b:ref index="1"/>')))),
+        ("slices.3mf", "P021", package(model_xml(sliced(obj)))),
+        ("slices-tilted.3mf", "P022", package(model_xml(sliced(obj), item("1 0 0 0 0 1 0 -1 0 0 0 0")))),
+        ("slices-stretched.3mf", "P022", package(model_xml(sliced(obj), item("1 0 0 0 1 0 0 0 2 0 0 0")))),
         ("two-colors.3mf", "P019", package(model_xml(
             colors + colors.replace('"6"', '"7"')
             + '<m:multiproperties id="8" pids="6 7"><m:multi pindices="0 0"/></m:multiproperties>' + obj))),
     ]  # fmt: skip
+
+
+def lattice(beams, sets=""):
+    """An object of a cube with beams of radius 1 on its vertices."""
+    sets = f"<b:beamsets><b:beamset>{sets}</b:beamset></b:beamsets>" if sets else ""
+    beams = f'<b:beamlattice radius="1" minlength="0.01"><b:beams>{beams}</b:beams>{sets}</b:beamlattice>'
+    return f'<object id="1">{mesh_xml()}</object>'.replace("</mesh>", f"{beams}</mesh>")
+
+
+def sliced(one):
+    """An object with a stack of one slice."""
+    ring = "".join(f'<s:vertex x="{x}" y="{y}"/>' for x, y in ((0, 0), (9, 0), (0, 9)))
+    walk = '<s:segment v2="1"/><s:segment v2="2"/><s:segment v2="0"/>'
+    stack = f'<s:slice ztop="1"><s:vertices>{ring}</s:vertices><s:polygon startv="0">{walk}</s:polygon></s:slice>'
+    return f'<s:slicestack id="9">{stack}</s:slicestack>' + one.replace("<object", '<object s:slicestackid="9"')
 
 
 def _values():

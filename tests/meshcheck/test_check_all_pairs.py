@@ -104,3 +104,61 @@ def test_every_pair_of_thousands_of_meshes(kind):
 @pytest.mark.parametrize(("kind", "seed"), [("about a vertex", 100), ("two heights", 104), ("one tilted plane", 397)])
 def test_shells_that_share_no_more_than_an_edge_touch(kind, seed):
     _compare(kind, seed)
+
+
+def test_pairs_of_boxes_alike_are_the_only_ones_left_out():
+    rng = np.random.default_rng(5)
+    corners = np.sort(rng.integers(0, 60_000, (3000, 2, 3)).astype(np.uint16), axis=1)
+    corners[:, 1] = np.minimum(corners[:, 0].astype(int) + 9_000, 60_000)
+    rows = np.concatenate([corners[:, 0], 65_535 - corners[:, 1]], axis=1)
+    alike = np.repeat(rng.integers(-1, 4, 30), 100)
+
+    def found(numbers):
+        return {(min(i, j), max(i, j)) for block in boxes.meeting_pairs(rows, alike=numbers)
+                for i, j in zip(*(side.tolist() for side in block), strict=True)}  # fmt: skip
+
+    whole, fewer = found(None), found(alike)
+    lost = np.array(sorted(whole - fewer))
+    assert fewer < whole
+    assert (alike[lost[:, 0]] == alike[lost[:, 1]]).all()
+    assert (alike[lost[:, 0]] >= 0).all()
+
+
+def _prism(n, pierced):
+    """A prism on a polygon of n sides, its ends fans round their middles; `pierced` has a bar through one end."""
+    angle = np.arange(n) * 2 * np.pi / n
+    ring = np.stack([50 * np.cos(angle), 50 * np.sin(angle)], axis=1)
+    low, high = (np.column_stack([ring, np.full(n, z)]) for z in (0.0, 10.0))
+    onwards = [np.roll(end, -1, axis=0) for end in (low, high)]
+    middles = [np.broadcast_to([0.0, 0.0, z], (n, 3)) for z in (0.0, 10.0)]
+    faces = [(low, onwards[0], onwards[1]), (low, onwards[1], high), (onwards[0], low, middles[0]),
+             (high, onwards[1], middles[1])]  # fmt: skip
+    bar = (CUBE_CORNERS * [4.0, 4.0, 20.0] + [20.0, 5.0, 5.0])[CUBE_FACES]
+    return np.concatenate([*(np.stack(corner, axis=1) for corner in faces), *([bar] if pierced else [])])
+
+
+@pytest.mark.parametrize("pierced", [False, True])
+def test_a_fan_of_many_faces_is_crossed_by_others_only(pierced, monkeypatch):
+    mesh = Mesh(*weld_exact(_prism(500, pierced)), indexed=False)
+    topology = topology_of(mesh, Deadline(60.0).tick)
+    found = []
+    for least in (10**9, 64):
+        monkeypatch.setattr(crossings, "_FAN", least)
+        some = crossings.crossings_of(topology, Deadline(60.0).tick)
+        found.append({tuple(sorted(pair)) for pair in some.faces.original[some.deep].tolist()})
+    assert found[0] == found[1]
+    assert bool(found[0]) == pierced
+
+
+def test_pairs_of_a_fan_are_not_compared():
+    """200,000 sides took more than a minute: all boxes of an end meet round its middle."""
+    mesh = Mesh(*weld_exact(_prism(4000, False)), indexed=False)
+    topology = topology_of(mesh, Deadline(60.0).tick)
+    ticks = [0]
+
+    def tick():
+        ticks[0] += 1
+
+    some = crossings.crossings_of(topology, tick)
+    assert not some.crossed
+    assert ticks[0] < 100

@@ -22,7 +22,7 @@ RIGHT = [
     ("cross_1e-15.stl", {}, {}),
     ("cross_1e-15.stl", {"strict": True}, {"G001": "error"}),
     ("cross_0.5.stl", {}, {"G001": "error"}),
-    ("bambu_modifier.3mf", {}, {"P012": "warning", "P017": "warning"}),
+    ("bambu_modifier.3mf", {}, {"P012": "warning", "P017": "info"}),
     ("bambu_modifier.3mf", STRICT, {"P012": "error", "P017": "error"}),
     ("touch_edge_welded.3mf", {}, {"T003": "warning", "G003": "warning"}),
     ("touch_edge_welded.3mf", STRICT, {"T003": "error", "G003": "warning"}),

@@ -4,6 +4,7 @@ import html
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -41,7 +42,7 @@ def reports(tmp_path):
 
 def test_json_has_the_promised_shape(reports):
     data = json.loads(render(reports, "json"))
-    assert list(data) == ["files", "config"]
+    assert list(data) == ["files", "config", "baseline"]
     for entry, report in zip(data["files"], reports, strict=True):
         assert list(entry) == ["path", "verdict", "findings", "facts"]
         assert entry["verdict"] == report.verdict
@@ -49,7 +50,7 @@ def test_json_has_the_promised_shape(reports):
             "triangles", "vertices", "shells", "volume_mm3", "area_mm2", "bbox_mm", "watertight"
         ]  # fmt: skip
         for found in entry["findings"]:
-            assert list(found) == ["code", "severity", "message", "count", "locations", "fix"]
+            assert list(found) == ["code", "severity", "message", "count", "locations", "known", "fix"]
             assert found["fix"] == rules()[found["code"]].fix
     assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
 
@@ -62,7 +63,22 @@ def test_sarif_is_valid_and_complete(reports):
     assert len(run["results"]) == sum(len(report.findings) for report in reports)
     for result in run["results"]:
         assert listed[result["ruleIndex"]]["id"] == result["ruleId"]
-        assert " " not in result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+        place = result["locations"][0]["physicalLocation"]
+        assert " " not in place["artifactLocation"]["uri"]
+        assert place["region"]["startLine"] >= 1
+        assert set(result["partialFingerprints"]) == {"fileAndRule/v1", "primaryLocationLineHash"}
+    prints = [result["partialFingerprints"]["fileAndRule/v1"] for result in run["results"]]
+    assert len(set(prints)) == len(prints)
+
+
+def test_a_fingerprint_stays_when_a_part_is_exported_again_or_named_otherwise(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    prints = []
+    for triangles, path in ((box()[2:], "a.stl"), (box()[3:], "./a.stl"), (box()[:-2], str(tmp_path / "a.stl"))):
+        (tmp_path / "a.stl").write_bytes(stl(triangles))
+        (result,) = sarif_of(check_file(path))["results"]
+        prints.append(result["partialFingerprints"])
+    assert prints[0] == prints[1] == prints[2]
 
 
 def test_github_annotations_are_escaped(reports):
@@ -80,6 +96,22 @@ def test_junit_parses_and_counts(reports):
     strict = ET.fromstring(render(reports, "junit", "warning"))[0]
     assert strict.get("failures") == "3"
     assert [case.get("name") for case in suite] == [report.path for report in reports]
+    timed = [replace(report, seconds=k / 8) for k, report in enumerate(reports)]
+    suite = ET.fromstring(render(timed, "junit"))[0]
+    assert [case.get("time") for case in suite] == ["0.000", "0.125", "0.250", "0.375"]
+    assert suite.get("time") == "0.750"
+
+
+def test_junit_has_one_failure_a_case_with_all_findings():
+    found = tuple(Finding(code, severity, f"fault {code}") for code, severity in
+                  (("T001", "error"), ("T007", "error"), ("T003", "warning")))  # fmt: skip
+    (case,) = ET.fromstring(
+        render([FileReport("a.stl", (*found, replace(found[1], code="T002", known=True)))], "junit")
+    )[0]
+    (failure,) = case.findall("failure")
+    assert (failure.get("type"), failure.get("message")) == ("T001,T007", "fault T001; and 1 more finding")
+    assert "fault T007" in failure.text
+    assert case.findtext("system-out").splitlines() == ["T003 warning: fault T003", "T002 known: fault T007"]
 
 
 def test_text_is_one_line_a_finding_and_holds_no_control_characters():

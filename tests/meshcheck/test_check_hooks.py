@@ -10,12 +10,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from msgspec import structs
 from shapes import box, stl
 from test_check_command import run
 from typer.main import get_command
 
-from unitcad.cli import app, check_command
+from unitcad.cli import app
+from unitcad.meshcheck import settings
 from unitcad.meshcheck.output import json_report
 
 needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
@@ -184,21 +184,27 @@ def test_a_wrong_command_leaves_no_report_of_an_earlier_run(tmp_path):
 
 
 @needs_bash
-@pytest.mark.parametrize(("step", "code", "wanted"), [("true", 0, "[step]"), ("false", 0, ""), ("yes", 2, None)])
-def test_the_action_installs_the_step_kernel_on_demand(step, code, wanted, tmp_path):
+@pytest.mark.parametrize(
+    ("step", "alone", "code", "wanted"),
+    [("true", "false", 0, "[step]"), ("false", "false", 0, ""), ("yes", "false", 2, "step must be true or false, not yes"),
+     ("false", "true", 0, "/packages/unitcad-check"), ("true", "true", 2, "alone takes no step"),
+     ("false", "1", 2, "alone must be true or false, not 1")],
+)  # fmt: skip
+def test_the_action_installs_the_step_kernel_or_the_check_alone_on_demand(step, alone, code, wanted, tmp_path):
     _program(tmp_path / "bin/python", "")
     environment = {
         **os.environ,
         "SOURCE": "/a b/unitcad",
         "STEP": step,
+        "ALONE": alone,
         "PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}",
     }
     done = subprocess.run(
         ["bash", "-eo", "pipefail", "-c", _scripts()[0]], env=environment, capture_output=True, text=True
     )
     assert done.returncode == code
-    if wanted is None:
-        assert "step must be true or false, not yes" in done.stdout
+    if code:
+        assert wanted in done.stdout
     else:
         assert _calls(tmp_path) == [f"-m|pip|install|--quiet|/a b/unitcad{wanted}|"]
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
@@ -222,12 +228,11 @@ def test_the_settings_on_the_page_are_settings(tmp_path, monkeypatch):
     assert [name for name, _ in shown] == ["unitcad.toml"]
     for name, text in shown:
         (tmp_path / name).write_text(text)
-        found = check_command.find(name)
+        found = settings.find(name)
         assert found.ignored("scans/a.stl")
-        assert all(value is not None for value in structs.asdict(found.settings).values()), (
-            "it shows every key there is"
-        )
+        assert all(value is not None for value in vars(found.settings).values()), "it shows every key there is"
         (tmp_path / "part.stl").write_bytes(stl(box()))
+        run("part.stl", "--write-baseline", "known.json", cwd=tmp_path)
         assert run("part.stl", cwd=tmp_path).returncode == 0
 
 
@@ -279,7 +284,13 @@ def test_the_action_runs_no_code_of_the_checkout(step, search, fresh_python, tmp
         (project / name).write_text(text)
     ran.mkdir()
     (checkout / "a.stl").write_bytes(stl(box()))
-    inputs = {"STEP": "false", "SOURCE": str(project), "PIP_TARGET": str(tmp_path / "installed"), "PIP_NO_INDEX": "1"}
+    inputs = {
+        "STEP": "false",
+        "ALONE": "false",
+        "SOURCE": str(project),
+        "PIP_TARGET": str(tmp_path / "installed"),
+        "PIP_NO_INDEX": "1",
+    }
     inputs |= {"FILES": "a.stl\nno such name.stl", "FAIL_ON": "", "PRINTER": "", "SARIF": "", "SUMMARY": "true"}
     inputs |= {"ARGUMENTS": "--jobs 2 --output-format 'text'", "GITHUB_STEP_SUMMARY": str(tmp_path / "summary.md")}
     programs = fresh_python if step == "Install" else Path(sys.executable).parent

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from polygon_files import ply
 from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, package, stl
 
+from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.findings import number
 
 
@@ -36,6 +37,13 @@ def test_numbers_are_within_their_digits(value):
     assert "e" not in text
     assert text != "-0"
     assert float(text) == pytest.approx(value, rel=5.1e-6, abs=1.1e-6)
+
+
+@pytest.mark.parametrize(("n", "told"), [(10_000, "10000 faces"), (10_001, "more than 10,000 faces")])
+def test_places_are_counted_up_to_ten_thousand(n, told):
+    faces = np.concatenate([CUBE_FACES, np.tile([[0, 0, 1]], (n, 1))])
+    found = check_mesh(CUBE_CORNERS * 10, faces).findings
+    assert [(item.code, item.count, item.message) for item in found] == [("T010", 10_000, f"{told} without area")]
 
 
 def test_no_volume_of_a_mesh_that_is_not_oriented(judge):

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from manifold3d import CrossSection
 from shapes import CUBE_CORNERS, CUBE_FACES, box, fin, finding, obj, prism, stl, turned
 from test_check_depth import pieces
 from test_check_overlap import BOW_TIE, pentagram
 
 from unitcad.meshcheck import check_bytes
+from unitcad.meshcheck.geometry.disputed import deepest
 from unitcad.meshcheck.geometry.layers import Slicer
 from unitcad.meshcheck.geometry.mesh import weld_exact
 from unitcad.meshcheck.geometry.rays import winding_numbers
@@ -68,6 +70,15 @@ def test_outlines_are_those_that_a_plain_walk_finds():
         assert len({*zip(x.tolist(), y.tolist(), strict=True)}) == len(x)
         areas = [np.dot(o[:, 0], np.roll(o[:, 1], -1)) - np.dot(o[:, 1], np.roll(o[:, 0], -1)) for o in layer.outlines]
         assert sum(areas) / 2 == pytest.approx(total, abs=1e-6)
+
+
+def test_the_largest_circle_of_a_needle_ends():
+    """No offset of it leaves anything; halving the radius for ever found no end."""
+    needle = CrossSection([[(-0.0125, 1.6942), (-0.01328, 1.80462), (-0.01256, 1.7)]])
+    assert not needle.is_empty()
+    assert deepest(needle)[0] < 1e-3
+    for side in (1e-6, 3e-8):
+        assert deepest(CrossSection.square([5, side]))[0] == pytest.approx(side / 2, rel=0.03, abs=1e-7)
 
 
 def test_loose_ends_are_joined_to_the_nearest():

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.errors import install_command
+from unitcad.extras import install_command
 from unitcad.meshcheck import Limits, Options, check_file, file_checks
 from unitcad.meshcheck.readers import read_step
 
@@ -92,3 +92,66 @@ def test_damaged_step_files_give_a_verdict_and_print_nothing(tmp_path, capfd):
     )
     assert [found.code for found in check_file(path).findings] == ["F003"]
     assert capfd.readouterr().out == ""
+
+
+STEP = "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n{}\nENDSEC;\nEND-ISO-10303-21;\n"
+
+
+@pytest.mark.parametrize("entities", [
+    "#1=SHAPE_REPRESENTATION('',(" + "#1," * 500_000 + "#1),#1);",
+    "#1=FOO(" + "(0.)," * 300_000 + "0.);",
+    ("#1=FOO(" + "#2," * 25_000 + "0.);\n") * 8,
+    "#1=FOO(" + "#2,';'," * 200_000 + "#2);",
+    "#1=FOO(" + "#2,/*;*/" * 200_000 + "#2);",
+    "#1=(" + "A()" * 30_000 + ");",
+])  # fmt: skip
+def test_references_are_counted_before_occt_reads_them(entities, tmp_path, monkeypatch):
+    """OCCT takes ten minutes for the first one, of 1.5 MB."""
+    monkeypatch.setattr(read_step, "MEASURE", None)
+    path = tmp_path / "a.step"
+    path.write_text(STEP.format(entities))
+    (found,) = check_file(path).findings
+    assert found.code == "F011"
+    assert "the squares add up to" in found.message
+
+
+@pytest.mark.parametrize("entities", [
+    "".join(f"#{i}=CARTESIAN_POINT('',(0.,0.,0.));\n" for i in range(100_000)),
+    "#1=CLOSED_SHELL('',(" + ",".join(f"#{i}" for i in range(2, 40_000)) + "));",
+    "#1=CARTESIAN_POINT('" + "#(" * 500_000 + "',(0.,0.,0.));",
+    "/*" * 200_000,
+], ids=["points", "shell", "text", "open comment"])  # fmt: skip
+def test_files_of_usual_counts_are_read(entities):
+    read_step.expect_readable(STEP.format(entities).encode())
+
+
+def test_a_small_file_that_places_its_parts_millions_of_times_is_refused(tmp_path):
+    """A compound of two compounds of two ..., 20 deep: a million cubes, for which there is no memory."""
+    pytest.importorskip("OCP")
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.gp import gp_Trsf, gp_Vec
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS_Compound
+
+    from unitcad.meshcheck.readers.occt_bodies import MOST_REPEATS, expect_countable
+
+    builder, shapes = BRep_Builder(), [BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()]
+    for i in range(20):
+        whole = TopoDS_Compound()
+        builder.MakeCompound(whole)
+        for side in (0, 1):
+            place = gp_Trsf()
+            place.SetTranslation(gp_Vec(side * 2.0 * 2**i, 0, 0))
+            builder.Add(whole, shapes[-1].Moved(TopLoc_Location(place)))
+        shapes.append(whole)
+    empty = TopoDS_Compound()
+    builder.MakeCompound(empty)
+    for _ in range(MOST_REPEATS):
+        builder.Add(empty, shapes[0])
+    for shape in (shapes[20], empty):
+        with pytest.raises(read_step.TooMany, match="repeat their parts"):
+            builder.Add(empty, shapes[0])
+            builder.Add(empty, shapes[0])
+            expect_countable(shape)
+    assert expect_countable(shapes[9]).Extent() == 1

@@ -40,15 +40,20 @@ def mesh_findings(moulds):
     return findings
 
 
+def with_plan(moulds, plan):
+    """Return the set with other tools and pours."""
+    return replace(moulds, origin=replace(moulds.source, plan=lambda: plan))
+
+
 def with_fault(moulds, name, change):
     """Return the set with one tool drawn otherwise."""
     plan = moulds.plan
     tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
-    return MouldSet(moulds.spec, replace(plan, tools=tools))
+    return with_plan(moulds, replace(plan, tools=tools))
 
 
 def without(moulds, name):
     """Return the set with a tool forgotten on the bench."""
     plan = moulds.plan
     steps = tuple(replace(step, tools=tuple(tool for tool in step.tools if tool != name)) for step in plan.steps)
-    return MouldSet(moulds.spec, replace(plan, steps=steps))
+    return with_plan(moulds, replace(plan, steps=steps))

@@ -74,7 +74,7 @@ def test_grams_of_the_paper_units(name, grams):
 
 def test_mix_covers_waste_and_least_batch():
     spec = set_of("encapsulating", "casting.waste=0.25", "casting.minimum_mix_g=0.1").spec
-    mix = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0)
+    mix = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0, injected=False)
     assert mix.mix_g == pytest.approx(1.07 * 1.25)
     assert mix.part_a_g + mix.part_b_g == pytest.approx(mix.mix_g)
     assert mix.mix_error_pct == pytest.approx(100 * 0.005 / mix.part_a_g)

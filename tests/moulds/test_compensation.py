@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from faulty_sets import set_of, with_fault
+from faulty_sets import set_of, with_fault, with_plan
 
 from unitcad.casting.procedure import procedure
 from unitcad.catalogue import materials
@@ -10,7 +10,6 @@ from unitcad.checks.balance import findings as balance
 from unitcad.designs.dimensions import growth
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import bounds
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
 from unitcad.validation import load
 
@@ -46,7 +45,7 @@ def test_tools_that_do_not_follow_the_shrinkage_break_balance():
     for tool in ("cup2", "base"):
         faulty = with_fault(set_of(*SHRUNK), tool, lambda _, tool=tool: plain.tool(tool).shape)
         assert any(not finding.ok for finding in balance(faulty))
-    unscaled = MouldSet(load("encapsulating", ["moulds.shrinkage_percent=1"]), plain)
+    unscaled = with_plan(set_of("encapsulating", "moulds.shrinkage_percent=1"), plain)
     broken = [finding.where for finding in balance(unscaled) if not finding.ok]
     assert broken == ["pour 1: as it shrinks", "pour 2: as it shrinks"]
 

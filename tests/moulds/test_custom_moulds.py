@@ -81,6 +81,12 @@ def moulds_of(folder, code, *overrides, layers=1):
     return of_spec(load(written(folder, code, layers=layers), overrides))
 
 
+def by_complement(folder, code, *overrides, layers=1):
+    """Return the tooling by complement, without the ways of a room."""
+    spec = load(written(folder, code, layers=layers), overrides)
+    return complement(spec, cast_layers(spec))
+
+
 def test_cup_base_layers_and_seals_fill_the_block(tmp_path):
     moulds = moulds_of(tmp_path, lugs(), layers=2)
     spec, drawn = moulds.spec, complement(moulds.spec, cast_layers(moulds.spec))
@@ -127,7 +133,7 @@ def test_a_dome_has_no_opening_to_pour_into(tmp_path):
     with pytest.raises(
         Refusal, match="pour 1 can't be cast: the layer's top, at x = 0, y = 0, z = 4 mm, leaves an"
     ) as bad:
-        moulds_of(tmp_path, DOME.replace("FLAT", ""))
+        by_complement(tmp_path, DOME.replace("FLAT", ""))
     sentence = str(bad.value)
     assert (
         "to pour silicone takes 2 mm2 and a circle of 0.4 mm: give it a flat top, such as a disc of 1.6 mm" in sentence
@@ -137,7 +143,7 @@ def test_a_dome_has_no_opening_to_pour_into(tmp_path):
         code = DOME.replace("FLAT", f"({flat}, 4, 0), ")
         if not fits:
             with pytest.raises(Refusal, match=f"an opening of {math.pi * flat**2:.2g} mm2"):
-                moulds_of(tmp_path, code)
+                by_complement(tmp_path, code)
             continue
         area = next(f for f in check_moulds(moulds_of(tmp_path, code)) if f.code == "C410")
         assert area.ok
@@ -149,7 +155,7 @@ def test_a_layer_below_its_rim_has_no_opening(tmp_path):
     with pytest.raises(
         Refusal, match=r"pour 2 can.t be cast: the layer.s top, at .*, z = 2 mm, leaves an opening of 0 mm2"
     ):
-        moulds_of(tmp_path, code, layers=2)
+        by_complement(tmp_path, code, layers=2)
 
 
 @pytest.mark.parametrize(
@@ -170,7 +176,7 @@ def test_a_layer_below_its_rim_has_no_opening(tmp_path):
 )
 def test_what_has_no_mould_is_refused_with_pour_and_place(tmp_path, drawn, layers, why):
     with pytest.raises(Refusal, match=why):
-        moulds_of(tmp_path, f"def unit(spec):\n    return {drawn}\n", layers=layers)
+        by_complement(tmp_path, f"def unit(spec):\n    return {drawn}\n", layers=layers)
 
 
 def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path):
@@ -230,16 +236,6 @@ def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path):
     assert broken(moulds) == set()
 
 
-@pytest.mark.parametrize("earlier", [False, True])
-def test_only_an_estimate_is_refused_beside_a_result_too(earlier, tmp_path):
-    if earlier:
-        built(tmp_path, lugs(), layers=2)
-    there = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()}
-    with pytest.raises(Refusal, match=r"^only = 'estimate'.*has no estimate: the models describe"):
-        built(tmp_path, lugs(), "estimate", layers=2)
-    assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()} == there
-
-
 CUSTOM = templates()["embedded"].parent / "custom"
 FLAT_TOP = {"parameters.flat_mm": 1.6}
 
@@ -295,11 +291,12 @@ def test_the_worked_examples_are_built_whole(name, change, tmp_path):
     assert {"casting.md", "bom.csv", "moulds/base.stl", "step1-section.svg", *pours} <= set(done.manifest["files"])
 
 
-def test_the_dome_is_refused_and_nothing_is_written(tmp_path):
-    with pytest.raises(Refusal, match=r"pour 1 can't be cast: the layer's top, at x = 0, y = 0, z = 4 mm"):
-        build(load(CUSTOM / "dome.toml"), tmp_path / "out")
-    assert not list(tmp_path.rglob("*.*"))
-    assert build(load(CUSTOM / "dome.toml"), tmp_path / "out", only=("unit",)).ok
+def test_a_body_without_a_mould_is_refused_and_nothing_is_written(tmp_path):
+    code = "def unit(spec):\n    return cut(cylinder(7, 0, 4), [cylinder(5, 1, 3)])\n"
+    with pytest.raises(Refusal, match=r"is closed (in|all round)"):
+        built(tmp_path, code, "moulds")
+    assert not list((tmp_path / "out").rglob("*.*"))
+    assert built(tmp_path, code).folder.is_dir()
 
 
 def test_every_worked_example_has_its_test():

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 from faulty_sets import broken, of_spec, set_of
@@ -9,12 +10,13 @@ from manifold3d import CrossSection
 from msgspec import structs
 
 from tests.sample_bodies import LEADLESS
-from unitcad.checks import air
+from unitcad.checks import air, overlap
 from unitcad.designs import dimensions
 from unitcad.errors import Refusal
 from unitcad.moulds import lid
 from unitcad.moulds.layout import layout
 from unitcad.moulds.plan import plan
+from unitcad.shape import moved
 from unitcad.validation import from_data, load, read
 
 WIRES = {"diameter_mm": 0.3, "count": 2}
@@ -181,6 +183,19 @@ def test_wires_keep_every_law(design, count):
     for i in range(count):
         for layer in ("layer1", "layer2"):
             assert solids[f"wire{i + 1}"].min_gap(solids[layer], 1) > 0.09
+
+
+@pytest.mark.parametrize(("lower", "fits"), [(0.0, True), (0.005, False)])
+def test_a_wire_may_touch_its_slot_s_floor(lower, fits):
+    """Its polygon and the grid put it 1.4e-3 mm into the silicone: a wire that is 0.005 mm lower is another matter."""
+    data = {**wired("encapsulating"), "wires": {"diameter_mm": 0.8, "count": 2}, "skin_mm": 0.5}
+    moulds = of_spec(from_data({**data, "motor": {**data["motor"], "thickness_mm": 2.1}}))
+    slot = moulds.dimensions.exit
+    wire = next(body for body in moulds.unit if body.kind == "wire")
+    assert moulds.mesh(wire).bounding_box()[2] < slot.low  # the polygon's corner
+    sunk = tuple(replace(b, shape=moved(b.shape, z=-lower)) if b.kind == "wire" else b for b in moulds.unit)
+    moulds.__dict__["unit"] = sunk
+    assert all(finding.ok for finding in overlap.of_unit(moulds)) == fits
 
 
 def test_wires_that_cannot_be():

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from faulty_sets import broken, set_of, with_fault, without
+from faulty_sets import broken, set_of, with_fault, with_plan, without
 
 from docs.released import released
 from unitcad.checks import balance, check_moulds, mould_checks
@@ -163,7 +163,7 @@ def reordered(moulds, index, change):
         replace(step, removals=change(step.removals)) if i == index else step
         for i, step in enumerate(moulds.plan.steps)
     )
-    return MouldSet(moulds.spec, replace(moulds.plan, steps=steps))
+    return with_plan(moulds, replace(moulds.plan, steps=steps))
 
 
 @pytest.mark.parametrize(

@@ -142,10 +142,10 @@ def test_a_batch_is_listed_as_it_lists_itself(built, tmp_path):
 
 def test_what_was_swept_and_the_levels_come_first(sweep):
     columns = ["index", "status", "reason", "folder", "motor", "moulds.land_mm", "name", "design", "diameter_mm",
-               "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_published", "edge_divider"]  # fmt: skip
+               "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_level", "edge_low"]  # fmt: skip
     batch = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
     assert read_results.results_table(batch, [], {}).columns == [
-        "name", "motor", "moulds.land_mm", "design", "diameter_mm", "edge_published", "edge_divider",
+        "name", "motor", "moulds.land_mm", "design", "diameter_mm", "edge_level", "edge_low",
         "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
     ]  # fmt: skip
     without = data_of((sweep / "report.html").read_text("utf-8"))["table"]["columns"]

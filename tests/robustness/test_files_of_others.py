@@ -12,6 +12,7 @@ import filelock
 import pytest
 
 from unitcad import files
+from unitcad.documents import read_json
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build, clear_leftovers, replacing, subject
 from unitcad.report import write_report
@@ -191,7 +192,7 @@ def test_what_is_no_regular_file_of_a_fair_size_is_refused(kind, tmp_path):
 def test_json_that_is_none_is_one_clear_error(text, tmp_path):
     (tmp_path / "a.json").write_text(text)
     with pytest.raises(UnitcadError, match=r"a\.json: not JSON"):
-        files.read_json(tmp_path / "a.json")
+        read_json(tmp_path / "a.json")
 
 
 @pytest.mark.parametrize(
@@ -228,3 +229,25 @@ def test_scratch_of_a_process_that_ended_before_its_mark_is_removed(tmp_path):
     clear_leftovers(tmp_path)
     assert sorted(tmp_path.iterdir()) == [photo, fresh]
     assert sorted(file.name for file in photo.iterdir()) == ["photo.jpg", files.LOCK]
+
+
+@pytest.mark.parametrize("kind", ["device", "pipe", "folder"])
+@pytest.mark.parametrize("linked", [False, True])
+def test_nothing_but_a_file_is_replaced(kind, linked, tmp_path):
+    """As root, a rename would put a file in the place of /dev/null."""
+    target = tmp_path / "target"
+    if kind == "device":
+        try:
+            os.mknod(target, stat.S_IFCHR | 0o666, os.makedev(1, 3))
+        except PermissionError:
+            pytest.skip("only root makes devices")
+    else:
+        {"pipe": os.mkfifo, "folder": os.mkdir}[kind](target)
+    path = tmp_path / "link" if linked else target
+    if linked:
+        path.symlink_to(target)
+    before = os.lstat(path)
+    with pytest.raises(UnitcadError, match=f"{path.name}: is a {kind}, not a regular file"):
+        files.write(path, b"x")
+    assert os.lstat(path) == before
+    assert not list(tmp_path.glob(".tmp-*"))

@@ -26,7 +26,7 @@ def test_a_unit_measured_outside_the_goals_is_no_proposal():
     assert [one["measured"] is None for one in data] == sorted(one["measured"] is None for one in data)
     assert [one["rank"] for one in data] == list(range(1, len(data) + 1))
     data = invert(load_target("published"), check=False).data["proposals"]
-    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target" in level_line(data[1])
+    assert "The measurement (5.2 %, also printed as 4.6 %, the paper) meets the target." in level_line(data[1])
 
 
 def test_a_unit_that_was_measured_within_the_goals_is_never_refused():

@@ -55,7 +55,8 @@ def test_a_text_that_is_no_toml_is_told_with_its_line(server, text):
         i for i, line in enumerate(answer["text"].splitlines(), 1) if "= =" in line
     )
     longest = server.ask(text + "\nlong = " + "9" * 5000)
-    assert "thousands of digits" in longest["faults"][0]["message"]
+    assert "number of more than 1000 characters" in longest["faults"][0]["message"]
+    assert longest["faults"][0]["line"] == len(text.splitlines()) + 2
 
 
 def test_the_form_has_every_key_of_the_schema_with_its_range(server, text):

@@ -4,11 +4,11 @@ import pytest
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.arrays.array_file import array_templates
+from unitcad.documents import read_toml
 from unitcad.serve.answers import answered
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Ask, Edit, Trusted
 from unitcad.serve.server import _trusted_source
-from unitcad.spec import read_toml
 from unitcad.validation import custom_templates, templates
 
 
@@ -141,12 +141,15 @@ def test_a_bed_that_is_too_small_is_refused_at_the_count_that_was_changed():
     assert (fault.field, fault.at, fault.at_nearest) == ("moulds.bed_x_mm", "layout.columns", 9)
 
 
-def test_no_option_of_the_command_line_is_told_on_the_page():
-    path = custom_templates()["custom/dome"]
+def test_no_option_of_the_command_line_is_told_on_the_page(tmp_path):
+    hollow = "from unitcad.shape import cut, cylinder\n\ndef unit(spec):\n"
+    (tmp_path / "dome.py").write_text(f"{hollow}    return cut(cylinder(7, 0, 6), [cylinder(5, 3, 5)])\n")
+    path = tmp_path / "hollow.toml"
+    path.write_text(custom_templates()["custom/dome"].read_text("utf-8"))
     known = Trusted([_trusted_source(read_toml(path), path, code=True)])
     told = answered(Ask(text=path.read_text("utf-8"), what="moulds"), known).faults
     assert [fault.field for fault in told] == ["design"]
-    assert "can't be cast" in told[0].message
+    assert "closed" in told[0].message
     assert "--only" not in told[0].message
 
 

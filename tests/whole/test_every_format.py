@@ -12,8 +12,9 @@ from unitcad.errors import Refusal
 from unitcad.export import drawing as sheet
 from unitcad.export.chart import coord
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.pipeline import make, optional
+from unitcad.pipeline import optional, unit
 from unitcad.pipeline.plan import plan
+from unitcad.pipeline.result import Progress
 from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.write import build
@@ -34,9 +35,8 @@ def every_spec():
 
 
 def subject_of(name, **changes):
-    """Load a spec or an array with coarse facets; the dome, whose moulds are refused, with a flat top."""
+    """Load a spec or an array with coarse facets."""
     changes = {"output.tolerance_mm": 0.1, **changes}
-    changes |= {"parameters.flat_mm": 1.6} if name.endswith("dome") and "gel" not in name else {}
     try:
         return load_subject(name, changes)
     except Refusal:  # of an array
@@ -71,7 +71,7 @@ def test_meshes_assemblies_and_drawings_of_every_spec(name):
 @pytest.mark.parametrize("name", every_spec())
 def test_every_format_of_every_spec_is_made(name, tmp_path):
     pytest.importorskip("OCP")
-    done = build(subject_of(name, **{"output.formats": list(FORMATS)}).of, tmp_path, check=False)
+    done = build(subject_of(name, **{"output.formats": list(FORMATS)}), tmp_path, check=False)
     assert [each for each in done.manifest["skipped"] if each["reason"].startswith(optional.UNMADE)] == []
     assert (done.folder / "drawing.pdf").stat().st_size > 1000
     made = {path.suffix for path in done.folder.rglob("*") if path.is_file()}
@@ -85,7 +85,7 @@ def test_a_drawing_that_can_not_be_made_costs_the_drawing_and_a_sentence(fault, 
 
     monkeypatch.setattr(sheet, "upright", broken)
     monkeypatch.delenv("UNITCAD_TRACEBACK", raising=False)
-    done = build(load_subject("embedded", {"output.formats": ["stl", "pdf"]}).of, tmp_path, only=("moulds",))
+    done = build(load_subject("embedded", {"output.formats": ["stl", "pdf"]}), tmp_path, only=("moulds",))
     assert done.ok
     assert not (done.folder / "drawing.pdf").exists()
     (lacking,) = [each for each in done.manifest["skipped"] if each["output"] == "drawing.pdf"]
@@ -99,7 +99,7 @@ def test_a_lack_of_the_machine_ends_the_build(error, monkeypatch):
     def broken(*given):
         raise error
 
-    monkeypatch.setattr(make, "drawing", broken)
+    monkeypatch.setattr(unit, "drawing", broken)
     subject = load_subject("embedded", {"output.formats": ["pdf"]})
     with pytest.raises(type(error)):
-        subject.make(("unit",), False, MemoryStore(), make.Progress())
+        subject.make(("unit",), False, MemoryStore(), Progress())

@@ -23,7 +23,7 @@ def test_a_result_of_all_formats_passes_check_and_its_manifest(template, tmp_pat
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("template", sorted({*every_template()} - {"custom/dome"}))  # which has no moulds
+@pytest.mark.parametrize("template", sorted(every_template()))
 def test_a_result_passes_check_and_its_manifest(template, tmp_path):
     passes(template, tmp_path, "stl,3mf")
 

@@ -13,8 +13,9 @@ from rich.table import Table
 from unitcad.accuracy.amplification import amplifications, extremes
 from unitcad.accuracy.measurements import mesh_rows, response_rows, skipped_rows
 from unitcad.accuracy.survey import survey_media, survey_specs
-from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.output import print_json, progress
 from unitcad.cli.shared_options import AsJson, Sets
+from unitcad.cli.tables import console
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input

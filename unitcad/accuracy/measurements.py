@@ -20,8 +20,11 @@ from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.cache import MemoryStore
 from unitcad.kernels import bounds, mesh
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.make import Progress, Subject, forget
+from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.result import Progress
+from unitcad.pipeline.subject import Subject
+from unitcad.pipeline.unit_estimate import forget
 from unitcad.shape import Shape
 from unitcad.spec.raw import OUTPUTS
 
@@ -262,4 +265,4 @@ def skipped_rows(subject: Subject) -> list[dict[str, Any]]:
 def _manifest(subject: Subject, request: Request) -> Manifest:
     only, formats, check = request
     forget()
-    return subject.with_formats(formats).make(only, check, MemoryStore(), Progress()).manifest  # type: ignore[arg-type]
+    return make(subject.with_formats(formats), only, check, MemoryStore(), Progress()).manifest  # type: ignore[arg-type]

@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from unitcad import text
+from unitcad.api.changes import all_changes
 from unitcad.arguments import path, texts
+from unitcad.pipeline.manifest import PAGE
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.variant import Variant
-from unitcad.pipeline.write import PAGE, Built, hold_folder
+from unitcad.pipeline.write import Built, hold_folder
 from unitcad.pipeline.write import build as build_whole
 from unitcad.report import write_report
 from unitcad.spec import Spec
@@ -25,8 +28,13 @@ class Buildable(Protocol):
     """An object that a room loaded, such as an array of units."""
 
     @property
-    def subject(self) -> str:
-        """The class by which the pipeline builds it, as "module:name"."""
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def unit(self) -> Spec:
+        """The spec of its unit, or of the first of several."""
         ...
 
 
@@ -44,6 +52,8 @@ class BuildResult(Built):
         Whether every check passed.
     spec : Spec
         Spec of the unit.
+    lines : tuple of str
+        Summary, as `unitcad build` prints it.
     volumes : dict of str to float
         Volume of each body's mesh, mm3, by name.
 
@@ -57,6 +67,7 @@ class BuildResult(Built):
     """
 
     spec: Spec
+    lines: tuple[str, ...] = ()
 
     @property
     def volumes(self) -> dict[str, float]:
@@ -100,6 +111,7 @@ def build(
     only: Sequence[str] | str = OUTPUTS,
     check: bool = True,
     report: bool = False,
+    fit: str | os.PathLike[str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> BuildResult:
     """Build a unit and its moulds, or an array of units.
@@ -119,7 +131,9 @@ def build(
     check : bool, default True
         Run the mould checks and the mesh checks.
     report : bool, default False
-        Write report.html, one offline page.
+        Write report.html, one offline page. An existing page is always updated.
+    fit : path, optional
+        A lab-fit.toml of `unitcad fit`. Default: the shipped models' constants.
     progress : callable, optional
         Called with the name of each step.
 
@@ -141,12 +155,49 @@ def build(
     >>> built.ok, round(built.volumes["layer1"])
     (True, 181)
     """
+    shown = nullcontext(progress or (lambda stage: None))
+    (built,) = build_each(
+        [source],
+        out,
+        set=set,
+        formats=formats,
+        only=only,
+        check=check,
+        report=report,
+        fit=fit,
+        shown=lambda name: shown,
+    )
+    return built
+
+
+def build_each(
+    sources: Sequence[Source | Buildable],
+    out: str | os.PathLike[str] = "out",
+    *,
+    set: Changes = (),
+    formats: Sequence[str] | str | None = None,
+    only: Sequence[str] | str = OUTPUTS,
+    check: bool = True,
+    report: bool = False,
+    fit: str | os.PathLike[str] | None = None,
+    shown: Callable[[str], AbstractContextManager[Callable[[str], object]]],
+    warn: Callable[[str], None] = lambda line: None,
+) -> list[BuildResult]:
+    """Build several specs or arrays as `build` does; every one is validated before the first one is built.
+
+    `shown` opens the display of a build's steps by its name; `warn` takes a line for each damaged file of a page.
+    """
     into, outputs = Path(path("out", out)), texts("only", only)
-    wanted = load_subject(source, set, outputs)
-    if formats is not None:
-        wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
-    built = build_whole(wanted.of, into, only=outputs, check=check, say=progress or (lambda step: None))
-    if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
-        with hold_folder(built.folder):
-            write_report(built.folder)
-    return BuildResult(built.folder, built.manifest, built.sha256, wanted.unit)
+    changes = all_changes(set, formats=formats, fit=fit)
+    wanted = [load_subject(source, changes, outputs) for source in sources]
+    results: list[BuildResult] = []
+    for subject in wanted:
+        with shown(subject.name) as say:
+            built = build_whole(subject, into, only=outputs, check=check, say=say)
+            if report or (built.folder / PAGE).is_file():  # an older page would show the result before this one
+                say("page")
+                with hold_folder(built.folder):
+                    write_report(built.folder, warn)
+        lines = tuple(subject.summary(built.folder, built.manifest))
+        results.append(BuildResult(built.folder, built.manifest, built.sha256, subject.unit, lines))
+    return results

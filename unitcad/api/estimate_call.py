@@ -17,18 +17,22 @@ from unitcad.validation import Changes, Source, load
 
 @dataclass(frozen=True, repr=False)
 class EdgeEstimate:
-    """Fraction of the motor's vibration that reaches the unit's edge, by model.
+    """Level at a unit's edge, with its 80 % range and the measurement of that unit.
+
+    Printed, it is the one line that every command shows.
 
     Attributes
     ----------
-    answer : str
-        The sentence that leads the estimate.
-    edge : dict of str to float or None
-        Amplitude at the edge over the motor's, by model; None if a model gives no number.
-    table_error : dict of str to float
-        Geometric-mean factor by which each model misses the measured levels; 1 is exact.
+    level : float or None
+        Amplitude at the edge over the motor's, by the leading model; None if it is not known.
+    low, high : float or None
+        Ends of the 80 % range of the level.
     measured : float or None
-        Measured amplitude at the edge over the motor's, if the article has this unit.
+        Measured amplitude at the edge over the motor's, if this unit was measured.
+    lines : list of str
+        The level, the model behind it with its error, and the paper's analytic model, in words.
+    models : dict of str to float or None
+        Level by each model that was asked for; None if a model gives no number.
     frequency_hz : float
         Frequency of the drive, Hz.
     data : dict
@@ -37,26 +41,29 @@ class EdgeEstimate:
     Examples
     --------
     >>> import unitcad
-    >>> unitcad.estimate("encapsulating").frequency_hz
-    125.0
+    >>> estimated = unitcad.estimate("encapsulating")
+    >>> print(estimated)
+    Level at the edge: 4.6 % of the motor's amplitude (3.1 to 6.8). Measured in the paper for this unit: 5.2 %.
+    >>> round(estimated.level, 3), round(estimated.low, 3), round(estimated.high, 3), estimated.measured
+    (0.046, 0.031, 0.068, 0.0517)
     """
 
     data: dict[str, Any]
 
     @property
-    def answer(self) -> str:
-        """The two lines that lead the estimate: the measured or expected level, and the paper's analytic model."""
-        return "\n".join(summary(self.data)["lines"])
+    def level(self) -> float | None:
+        """The amplitude at the edge over the motor's, by the leading model; None if it is not known."""
+        return summary(self.data)["level"]
 
     @property
-    def edge(self) -> dict[str, float | None]:
-        """The amplitude at the edge over the motor's, by model; None if no number can be given."""
-        return {model: row["edge"] for model, row in summary(self.data)["models"].items()}
+    def low(self) -> float | None:
+        """The lower end of the level's 80 % range."""
+        return summary(self.data)["low"]
 
     @property
-    def table_error(self) -> dict[str, float]:
-        """The geometric-mean factor by which each model misses the measured levels; 1 is exact."""
-        return {model: row["table_error"] for model, row in summary(self.data)["models"].items()}
+    def high(self) -> float | None:
+        """The upper end of the level's 80 % range."""
+        return summary(self.data)["high"]
 
     @property
     def measured(self) -> float | None:
@@ -64,20 +71,29 @@ class EdgeEstimate:
         return summary(self.data)["measured"]
 
     @property
+    def lines(self) -> list[str]:
+        """The level, the model behind it with its error, and the paper's analytic model, in words."""
+        return self.data["answer"]["lines"]
+
+    @property
+    def models(self) -> dict[str, float | None]:
+        """The level by each model that was asked for; None if a model gives no number."""
+        return {name: block["edge_level"].get("value") for name, block in self.data["models"].items()}
+
+    @property
     def frequency_hz(self) -> float:
         """The frequency of the drive, Hz."""
         return float(summary(self.data)["frequency_hz"])
 
+    def __str__(self) -> str:
+        return summary(self.data)["line"]
+
     def __repr__(self) -> str:
-        levels = ", ".join(f"{model} {text.shown(level)}" for model, level in self.edge.items())
-        name = text.shorten(str(self.data["variant"]["name"]), 40)
-        return f"EdgeEstimate({name!r}: {self.frequency_hz:g} Hz; edge over motor: {levels})"
+        return f"EdgeEstimate({text.shorten(str(self.data['variant']['name']), 40)!r}: {self})"
 
     def _repr_html_(self) -> str:
-        rows = [(model, level, self.table_error[model]) for model, level in self.edge.items()]
-        head = ("model", "edge over motor", "error against the measured table, factor")
-        measured = f"; measured {text.shown(self.measured)}" if self.measured is not None else ""
-        return text.table(head, rows, f"{self.data['variant']['name']}, {self.frequency_hz:g} Hz{measured}")
+        row = (self.level, self.low, self.high, self.measured)
+        return text.table(("level at the edge", "low", "high", "measured"), [row], repr(self))
 
 
 def estimate(
@@ -98,15 +114,15 @@ def estimate(
     set : dict or sequence of str, optional
         Changes by dotted path: ``{"layers.0.wall_mm": 1.2}`` or ``["layers.0.wall_mm=1.2"]``. Lengths in mm.
     models : str or sequence of str, optional
-        Models of the level: "rule", "published", "corrected", "divider"; "fem" needs scikit-fem and seconds.
-        Default: those of the spec.
+        Models in the data: "rule", "published", "corrected"; "fem" needs scikit-fem and seconds. The level does not
+        depend on them. Default: those of the spec.
     frequency_hz : float, optional
         Frequency of the drive, Hz, 1 to 5000. Default: that of the spec or the motor.
 
     Returns
     -------
     EdgeEstimate
-        Levels by model, as fractions of the motor's amplitude, with their errors.
+        The level with its range, and all data behind it.
 
     Raises
     ------

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 from unitcad.arrays.array_tables import Cast, CircuitTable, Construction
 from unitcad.designs import design_of
@@ -81,8 +81,6 @@ class Array:
     sheet: Sheet
     circuit: CircuitTable | None
     asked: dict[str, Any]
-    subject: ClassVar[str] = "unitcad.arrays.arrayed:Arrayed"
-    """The class by which the pipeline builds it."""
 
     @cached_property
     def units(self) -> tuple[Spec, ...]:

@@ -26,20 +26,21 @@ from unitcad.arrays.layouts.ring import RingTable
 from unitcad.arrays.sheet import middle_radius, sheet_of
 from unitcad.arrays.tails import Blocked, angles, length_field, tail_length
 from unitcad.designs.limits import up
+from unitcad.documents import line_of, read_toml
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
 from unitcad.moulds.plan import Plan
 from unitcad.shape import mm
-from unitcad.spec import Spec, convert, read_toml, to_data
+from unitcad.spec import Spec, convert, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.paths import EXACT, in_words, meant
 from unitcad.spec.raw import RawSpec
-from unitcad.spec.toml import line_of, text_of
+from unitcad.spec.toml import text_of
 from unitcad.text import join_words
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.load import named_file, override, shipped_files
-from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, put
+from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, plain, put
 from unitcad.validation.suggestions import Judge, every_fault, numbers, suggest_value
 
 
@@ -74,8 +75,6 @@ def with_changes(written: Mapping[str, Any], file: Mapping[str, Any], changes: M
 def expand(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
     """Return an array's plain data with the whole spec of each unit in it. Raises Refusal for a unit not found."""
     whole = copy.deepcopy(dict(data))
-    if isinstance(whole.get("place"), tuple):
-        whole["place"] = list(whole["place"])
     for path, unit in units_in(whole).items():
         put(whole, path, unit_data(unit, path, folder))
     return whole
@@ -199,7 +198,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
     if isinstance(source, Array):
         data, folder = copy.deepcopy(source.asked), Path()
     elif isinstance(source, Mapping):
-        data, folder = copy.deepcopy(dict(source)), Path()
+        data, folder = plain(source), Path()
     else:
         path = named_file(os.fspath(source), array_templates(), "array", WrongArgument)
         data, folder = read_toml(path), path.parent

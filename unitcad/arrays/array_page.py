@@ -19,6 +19,7 @@ from unitcad.arrays.array_file import array_of
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds, PatchPart, patch_bodies, patch_moulds, patch_parts
 from unitcad.casting.steps import duration
+from unitcad.documents import read_json, read_toml
 from unitcad.errors import UnitcadError
 from unitcad.export import glb
 from unitcad.export.raster import Surface, draw
@@ -26,14 +27,12 @@ from unitcad.kernels.mesh import arrays, bounds
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan, Step
-from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.manifest import BENCH, PAGE, Manifest
 from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
-from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_page
 from unitcad.report.read_results import expect, read_sound, read_table
 from unitcad.shape import union
 from unitcad.shape.tree import Body
-from unitcad.spec import read_toml
 from unitcad.text import number
 
 BELOW = 14.0
@@ -135,7 +134,7 @@ class ArrayManifest(Manifest):
 
 def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
     """Write `folder`/report.html of an array and return its path. Raises UnitcadError for a damaged manifest."""
-    manifest = files.read_json(folder / "manifest.json", links=False)
+    manifest = read_json(folder / "manifest.json", links=False)
     expect(manifest, ArrayManifest, folder / "manifest.json")
     target = folder / PAGE
     files.write(target, _page(folder, manifest, warn).encode("utf-8", "replace"))
@@ -275,7 +274,7 @@ def _units(folder: Path, manifest: ArrayManifest) -> str:
         page = f"{unit}/{PAGE}" if (folder / unit / PAGE).is_file() else f"{unit}/casting.md"
         rows.append(f'<tr><td><a href="{escape(page)}">{escape(unit)}</a></td><td>{count[unit]}</td></tr>')
     level = manifest["estimate"]
-    said = "".join(f"<p>{escape(line)}</p>" for line in level["lines"]) if level else ""
+    said = f"<p>{escape(level['line'])}</p>" if level else ""
     return f"<table><thead><tr><th>unit</th><th>places</th></tr></thead><tbody>{''.join(rows)}</tbody></table>{said}"
 
 
@@ -387,11 +386,11 @@ def pictures(moulds: PatchMoulds) -> dict[str, Callable[[], bytes]]:
     return {f"pictures/{name}.png": picture for name, picture in names.items()}
 
 
-def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
+def _solid(moulds: MouldSet, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
     return Surface(*arrays(moulds.mesh(body).translate(by)), body.colour)
 
 
-def take_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
+def take_apart(moulds: MouldSet) -> Iterator[tuple[Body, tuple[float, float, float]]]:
     """Yield tools and cast layers and how far each is moved (mm) to be shown apart.
 
     One over the other in the order of the pours; the pieces of a tool next to each other.
@@ -419,7 +418,7 @@ def is_moved_later(plan: Plan, step: Step) -> bool:
     return step.index < last.index and not set(step.layer) <= set(last.earlier)
 
 
-def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
+def _of_pour(moulds: MouldSet, step: Step) -> Iterator[tuple[Body, ...]]:
     """Yield the parts of one pour, from below: base and filaments, inserted layers, cup, silicone, lid."""
     plan, colours = moulds.plan, {body.step: body for body in moulds.unit}
     own = (*plan.standing(step, "base"), *plan.standing(step, "filament"))

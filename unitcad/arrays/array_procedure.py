@@ -39,6 +39,7 @@ from unitcad.casting.troubles import troubles
 from unitcad.casting.views import picture_path, pour_picture
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
 from unitcad.spec import Spec
@@ -53,12 +54,12 @@ def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
 
 def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
     """Return the procedure of an array that is cast round the limb; volumes as for `array_procedure`."""
-    flat = moulds.cast_flat
+    flat = moulds.inner
     assert flat is not None
     made = procedure(flat, layer_volumes_mm3[:-1], printed_mm3)
     spec, step = moulds.spec, moulds.plan.steps[-1]
     injected_spec = structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
-    under_lid = PatchMoulds(injected_spec, moulds.plan, array=moulds.array)
+    under_lid = replace(moulds, spec=injected_spec)
     known, cells = catalogue.materials(spec.materials), len(flat.plan.layout.cells)
     silicones = [known[each.material] for each in moulds.plan.steps]
     # In the words of the whole set: flat castings bond later, so their cups get no release agent.
@@ -116,7 +117,7 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
     )
 
 
-def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
+def _laid_in(moulds: PatchMoulds, flat: MouldSet, inner: Material) -> Iterator[BenchStep]:
     """Return the steps by which the inner layers move from their flat base to the curved one."""
     units, base, step = len(moulds.array.places), _base(moulds), moulds.plan.steps[-1]
     lid = spaced(step.lid or "")
@@ -226,13 +227,13 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 
 def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
-    yield moulds.across
+    yield moulds.plan.across
     yield (
         f"The sheet between the units: {grams_shown(moulds.array.sheet.thickness_mm, 2)} mm thick, at its four edges "
         "and in its middle. A lid that did not sit down shows here."
     )
     weights = " + ".join(grams_shown(each) for each in grams) + f" = {grams_shown(sum(grams))}"
-    yield f"Weigh one {moulds.makes}, trimmed, without motors and circuit: {weights} g. Less means air."
+    yield f"Weigh one {moulds.plan.makes}, trimmed, without motors and circuit: {weights} g. Less means air."
 
 
 def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:

@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from unitcad import __version__
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import (
     ArraySource,
@@ -30,11 +29,11 @@ from unitcad.arrays.array_file import (
     to_toml,
     with_formats,
 )
-from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, patch_glb, pictures, write_array_page
+from unitcad.arrays.array_page import ARRAY_FILE, patch_glb, pictures, write_array_page
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.circuit import crowded_tracks
 from unitcad.arrays.crosstalk import extras
-from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
+from unitcad.arrays.estimate_arrays import array_summary
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
@@ -42,26 +41,23 @@ from unitcad.cache import Store, digest
 from unitcad.casting.figures import check_castable
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
-from unitcad.casting.procedure_text import files as written
 from unitcad.casting.steps import pour_warnings
-from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
+from unitcad.documents import read_toml
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
-from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finish, geometry, mould_findings, record
+from unitcad.pipeline.geometry import geometric_result, record
+from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import (
-    CASTING,
+    DRAWING,
     NO_KERNEL,
     UNCHECKED,
     BodyFile,
     Manifest,
-    MeshFinding,
     PartRecord,
-    PourRecord,
     Skipped,
-    count_findings,
     printed_mm3,
 )
-from unitcad.pipeline.optional import UNMADE, OptionalFiles
+from unitcad.pipeline.optional import OptionalFiles
 from unitcad.pipeline.plan import (
     OUTPUTS,
     begun,
@@ -70,13 +66,14 @@ from unitcad.pipeline.plan import (
     file_stem,
     geometry_key,
     joint_key,
-    kernel_versions,
     step_file,
     stl_content,
 )
+from unitcad.pipeline.result import Product, Progress, Result
 from unitcad.pipeline.scenes import drawing
-from unitcad.pipeline.subjects import Compound
-from unitcad.spec import Spec, read_toml
+from unitcad.pipeline.subject import Compound
+from unitcad.pipeline.unit import Unit
+from unitcad.spec import Spec
 from unitcad.spec.raw import Format
 from unitcad.validation import Changes
 
@@ -84,11 +81,13 @@ from unitcad.validation import Changes
 class Arrayed(Compound):
     """An array, as a result is made of it."""
 
-    kind, file = "array", ARRAY_FILE
+    kind: ClassVar[str] = "array"
+    file: ClassVar[str] = ARRAY_FILE
+    of: ClassVar[type] = Array
 
-    def __init__(self, array: Array) -> None:
-        self.of, self.unit, self.name, self.hash = array, array.unit, array.name, array_hash(array)
-        self.formats = array.unit.output.formats
+    def __init__(self, of: Array, given: frozenset[str] = frozenset()) -> None:
+        self.array, self.unit, self.name, self.hash, self.given = of, of.unit, of.name, array_hash(of), given
+        self.formats = of.unit.output.formats
 
     @classmethod
     def load(cls, source: ArraySource, changes: Changes = ()) -> Arrayed:
@@ -104,18 +103,20 @@ class Arrayed(Compound):
 
     offered = staticmethod(suggest_for_array)
     write_page = staticmethod(write_array_page)
-    estimate = staticmethod(estimate_arrays)
 
-    def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
-        return array_summary(self.of, folder, manifest, given)
+    def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
+        return array_summary(self.array, folder, manifest, self.given)
 
     @property
     def moulds(self) -> PatchMoulds:
-        return patch_moulds(self.of, given=self.given)
+        return patch_moulds(self.array, given=self.given)
 
     @property
     def text(self) -> str:
-        return json.dumps(self.of.asked)
+        return json.dumps(self.array.asked)
+
+    def toml(self) -> str:
+        return to_toml(self.array)
 
     def key(self, only: Sequence[str], check: bool) -> str:
         return digest(repr((self.hash, tuple(only), check, code_version())).encode())
@@ -124,110 +125,58 @@ class Arrayed(Compound):
         return tuple(only)
 
     def with_formats(self, formats: Sequence[Format]) -> Arrayed:
-        return Arrayed(with_formats(self.of, tuple(formats)))
+        return Arrayed(with_formats(self.array, tuple(formats)), self.given)
 
-    def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
-        array: Array = self.of
-        moulds = self.moulds
+    def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Result:
+        array, moulds, made = self.array, self.moulds, Result()
         check_castable(moulds)  # refuses before the long work begins
+        optional = OptionalFiles(made.skipped)
         units = {
             folder: _unit(moulds, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()
         }
-        own: dict[str, bytes] = {Arrayed.file: to_toml(array).encode()}
-        shared: dict[str, str] = {}
-        parts: list[PartRecord] = []
-        findings: list[FindingRecord] = []
-        meshes: list[MeshFinding] = []
-        steps: list[PourRecord] = []
-        made: Procedure | None = None
-        drawn: list[str] = []
-        optional = OptionalFiles()
-        drawn_tools = "pdf" in self.formats and "moulds" in only
-        if drawn_tools and (page := optional.made(DRAWING, lambda: drawing(moulds, ("moulds",)))):
-            own[DRAWING] = page
+        drawn = "pdf" in self.formats and "moulds" in only
+        if drawn and (page := optional.made(DRAWING, lambda: drawing(moulds, ("moulds",)))):
+            made.own[DRAWING] = page
         if moulded := [name for name in ("moulds", "casting") if name in only]:
-            shape = geometry(moulds, moulded, check, store, progress)
-            shared |= shape["files"]
-            optional.skipped += shape["skipped"]
-            parts = list(shape["parts"])
-            findings, meshes = list(mould_findings(moulds.spec, shape)), list(shape["check"])
-            steps = [
-                {**step, "material": pour.material}
-                for step, pour in zip(shape["steps"], moulds.plan.steps, strict=True)
-            ]
+            shape = geometric_result(moulds, moulded, check, store, progress)
+            made.add(shape)
+            made.label = shape.label
         if "unit" in only:
             progress("patch")
-            of_patch, files = _patch(moulds, store, optional)
-            parts, shared = [*parts, *of_patch], shared | files
+            made.add(_patch(moulds, store))
         if {"unit", "moulds"} & set(only):
             progress("pictures")
             blank = moulds.blank
             for path, draw in pictures(blank).items():
                 key = geometry_key(blank, path)
                 if sha256 := optional.made(path, partial(store.file, key, draw)):
-                    shared[path] = sha256
-                    drawn.append(path)
-        if "casting" in only:
-            progress("casting")
-            made = _procedure(moulds, [step["layer_volume_mm3"] for step in steps], printed_mm3(parts), units)
-            own |= {path: text.encode() for path, text in written(made).items()}
-        progress("circuit and crosstalk")
-        more, lacking = extras(array, only)
-        own |= more
-        warned = [
+                    made.shared[path] = sha256
+                    made.pictures.append(path)
+        made.warnings = [
             *covered_tails_warning(array),
             *crowded_tracks(array),
             *shallow_grooves(moulds),
             *play_missing(moulds),
-            *(pour_warnings([asdict(pour) for pour in made.pours]) if made else []),
         ]
-        first = next(iter(units.values())).manifest
+        if "casting" in only:
+            progress("casting")
+            procedure = _procedure(moulds, made.volumes_mm3, made.printed_mm3, units)
+            made.cast(procedure)
+            made.warnings += pour_warnings([asdict(pour) for pour in procedure.pours])
+        progress("circuit and crosstalk")
+        more, lacking = extras(array, only)
+        made.own |= more
         for folder, product in units.items():
-            own |= {f"{folder}/{path}": content for path, content in product.own.items()}
-            shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
-            of_unit = product.manifest
-            findings += [
-                FindingRecord(**{**one, "where": f"{folder}: {one['where']}"}) for one in of_unit["mould_checks"]
-            ]
-            found = of_unit["check"]["findings"]
-            meshes += [MeshFinding(**{**one, "path": f"{folder}/{one['path']}"}) for one in found]
-            for part in of_unit["parts"]:
-                under = {form: BodyFile(**{**f, "path": f"{folder}/{f['path']}"}) for form, f in part["files"].items()}
-                parts.append({**part, "name": f"{folder}: {part['name']}", "files": under})
-            warned += [f"{folder}: {line}" for line in of_unit["warnings"]]
-        manifest = ArrayManifest(
-            name=array.name,
-            design=array.unit.design,
-            printer=array.unit.moulds.printer,
-            hash=self.hash[:12],
-            outputs=list(only),
-            label=moulds.plan.label if moulded else None,
-            warnings=warned,
-            air_ring_mm=first["air_ring_mm"],
-            mesh={**first["mesh"], "segments": moulds.segments},
-            parts=parts,
-            steps=steps,
-            mould_checks=findings,
-            estimate=first["estimate"],
-            check=count_findings(meshes),
-            pictures=drawn,
-            casting=sorted(path for path in own if path in CASTING) or None,
-            skipped=[
-                *_skipped(only, check, first["skipped"]),
-                *(Skipped(output=output, reason=reason) for output, reason in lacking.items()),
-                *optional.skipped,
-                *(
-                    Skipped(output=f"{folder}/{each['output']}", reason=each["reason"])
-                    for folder, product in units.items()
-                    for each in product.manifest["skipped"]
-                    if each["reason"].startswith(UNMADE)
-                ),
-            ],
-            versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
-            files={},
-            array=_record(array, list(units)),
-        )
-        return finish(manifest, own, shared, store)
+            made.add(product.below(folder))
+        first = next(iter(units.values())).manifest
+        made.air_ring_mm, made.estimate = first["air_ring_mm"], first["estimate"]
+        made.skipped = [
+            *_skipped(only, check, first["skipped"]),
+            *(Skipped(output=output, reason=reason) for output, reason in lacking.items()),
+            *made.skipped,
+        ]
+        made.blocks = {"array": _record(array, list(units))}
+        return made
 
 
 def unit_folders(array: Array) -> dict[str, Spec]:
@@ -245,9 +194,7 @@ def _unit(
     """Return a unit's own result; without moulds and casting if it is cast with the sheet."""
     wanted = [name for name in only if moulds.construction.own_tails or name not in ("moulds", "casting")] or ["unit"]
     progress.prefix = "unit: "
-    subject = Subject(unit)
-    subject.given = _given(moulds, unit)
-    product = subject.make(wanted, check, store, progress)
+    product = make(Unit(unit, _given(moulds, unit)), wanted, check, store, progress)
     progress.prefix = ""
     return product
 
@@ -258,31 +205,36 @@ def _given(moulds: PatchMoulds, unit: Spec) -> frozenset[str]:
     return frozenset(key.removeprefix(path) for key in moulds.given for path in paths if key.startswith(path))
 
 
-def _patch(moulds: PatchMoulds, store: Store, optional: OptionalFiles) -> tuple[list[PartRecord], dict[str, str]]:
-    """Return records and files of the silicone that the units share, and the files of the whole patch."""
+AS_CAST = "as cast; in patch.step and patch.glb its pockets are stretched round the units"
+
+
+def _patch(moulds: PatchMoulds, store: Store) -> Result:
+    """Return parts and files of the silicone that the units share, and the files of the whole patch."""
     blank, bodies, formats = moulds.blank, patch_bodies(moulds.array), moulds.spec.output.formats
     # A helper makes it in the meantime.
     step = [begun(step_file("patch/patch.step", blank, bodies, "patch"))] if "step" in formats else []
-    parts: list[PartRecord] = []
-    files: dict[str, str] = {}
+    made = Result()
     for body in blank.unit:
         material = moulds.plan.steps[(body.step or 1) - 1].material
         part = PartRecord(**{**record(blank, body), "material": material, "files": {}})
         if (solids := len(blank.mesh(body).decompose())) > 1:
             part["solids"] = solids
+        if moulds.construction.own_tails:
+            part["state"] = AS_CAST
         if "stl" in formats:
             path = f"patch/{file_stem(body)}.stl"
-            files[path] = store.file(body_key(blank, body, "stl"), partial(stl_content, blank, body))
-            part["files"]["stl"] = BodyFile(path=path, sha256=files[path])
-        parts.append(part)
+            made.shared[path] = store.file(body_key(blank, body, "stl"), partial(stl_content, blank, body))
+            part["files"]["stl"] = BodyFile(path=path, sha256=made.shared[path])
+        made.parts.append(part)
     whole = {planned.path: (planned.key, planned.make) for planned in step}
     if "glb" in formats:
         draw = partial(patch_glb, blank, patch_parts(moulds.array))
         whole["patch/patch.glb"] = partial(joint_key, blank, bodies, "patch.glb"), draw
-    for path, (key, make) in whole.items():
-        if sha256 := optional.made(path, lambda key=key, make=make: store.file(key(), make)):
-            files[path] = sha256
-    return parts, files
+    optional = OptionalFiles(made.skipped)
+    for path, (key, draw) in whole.items():
+        if sha256 := optional.made(path, lambda key=key, draw=draw: store.file(key(), draw)):
+            made.shared[path] = sha256
+    return made
 
 
 def _procedure(

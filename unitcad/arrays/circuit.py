@@ -29,8 +29,9 @@ from unitcad.arrays.tails import CLEAR, Strip
 from unitcad.designs import CIRCUIT_COLOUR, dimensions
 from unitcad.designs.dimensions import Pad
 from unitcad.designs.limits import up
-from unitcad.errors import Missing, Refusal, missing_extra
+from unitcad.errors import Missing, Refusal
 from unitcad.export.chart import coord
+from unitcad.extras import missing_extra
 from unitcad.geometry.segments import Point, to_box, to_segment
 from unitcad.shape import Common, Extrude, Profile, cylinder, moved
 from unitcad.shape.profile import Vertex, arc_centre, sides

@@ -17,15 +17,17 @@ import numpy as np
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
-from unitcad.attenuation.curve import RANGE, contact, decay, ends
+from unitcad.attenuation.curve import RANGE, contact, decay, ends, motion
+from unitcad.attenuation.inputs import Drive
 from unitcad.errors import Refusal
-from unitcad.estimate_inputs import estimate_input, estimate_spec
+from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.export.chart import coord
 from unitcad.shape import Profile
 from unitcad.text import join_words, number
 
-_SUMS = ("sum", "root_sum_of_squares")
-_ENDS = {"low": "p10", "high": "p90"}
+SUMS = ("in_phase", "worst_phases", "root_sum_of_squares")
+"""The amplitude at a place from all others: every motor in one phase, as a complex sum of vectors; the phases that give
+the most; and the root of the sum of squares, which motors give that are not synchronous."""
 DIGITS = 6
 ASSUMPTIONS = [
     "The decay is that of the bare, laterally uniform skin under each unit's own motor; the other units, the sheet and "
@@ -34,33 +36,42 @@ ASSUMPTIONS = [
     "A flat motor's force turns in the plane of the skin: |u| is then alike at every angle, and needs no direction.",
     "|u| is the root of the sum of the squares of the three components' amplitudes.",
     "Sums are in one unit's level at its edge, as if every unit were driven to that level.",
+    "In one phase every motor's force points the same way at each moment; the motions add as complex vectors.",
 ]
+
+
+def ways(array: Array) -> np.ndarray:
+    """Return the way from each unit's middle to each other's along the skin (mm), shape (n, n, 2), rows the first.
+
+    On a limb, x goes round it: ways are those along the unrolled skin, the shorter way round, and shorter than on the
+    flat sheet.
+    """
+    at = np.array([(place.x, place.y) for place in array.places])
+    across = at[None] - at[:, None]
+    if array.radius_mm is not None and array.middle_radius_mm is not None:
+        # Cast flat, places are as far apart as they are in the sheet's middle; the skin under it has the shorter arc.
+        across[..., 0] *= array.radius_mm / array.middle_radius_mm
+        half = math.pi * array.radius_mm
+        across[..., 0] = (across[..., 0] + half) % (2 * half) - half
+    return across
 
 
 def distances(array: Array) -> tuple[np.ndarray, np.ndarray]:
     """Return the distances to each other unit's middle, and to the nearest point of its edge, along the skin (mm).
 
     Their shape is (n, n), rows the unit that drives.
-    On a limb, x goes round it: distances are those along the unrolled skin, the shorter way round, and shorter than on
-    the flat sheet.
     """
-    at = np.array([(place.x, place.y) for place in array.places])
     radii = np.array([place.radius for place in array.places])
-    across = np.abs(at[:, None] - at[None])
-    if array.radius_mm is not None and array.middle_radius_mm is not None:
-        # Cast flat, places are as far apart as they are in the sheet's middle; the skin under it has the shorter arc.
-        across[..., 0] *= array.radius_mm / array.middle_radius_mm
-        half = math.pi * array.radius_mm
-        across[..., 0] = np.abs((across[..., 0] + half) % (2 * half) - half)
-    centre = np.hypot(across[..., 0], across[..., 1])
+    centre = np.linalg.norm(ways(array), axis=-1)
     return centre, np.maximum(centre - radii[None, :], radii[:, None])
 
 
 class Decays:
-    """An array's units, the inputs of each distinct one's estimate, and the decays between them.
+    """An array's units, the inputs of each distinct one's estimate, and the motions that they give each other.
 
-    `kind`: the number of each place's distinct unit; `centre`, `edge`: see `distances`. Raises Refusal for a unit
-    without an estimate, and for units on several tissues.
+    `kind`: the number of each place's distinct unit; `centre`, `edge`: see `distances`; `synchronous`: whether all
+    motors run at one frequency, so that phases mean anything. Raises Refusal for a unit without an estimate, and for
+    units on several tissues.
     """
 
     def __init__(self, array: Array) -> None:
@@ -71,49 +82,109 @@ class Decays:
                 raise Refusal("estimate.tissue", one.tissue_name, f"units side by side are on one tissue, {name}", name)
         self.kind = np.array([array.units.index(place.unit) for place in array.places])
         self.centre, self.edge = distances(array)
+        self.synchronous = len({one.frequency.middle for one in self.inputs}) == 1
 
-    def decays(self, drivers: np.ndarray, distances: np.ndarray, end: dict[str, int] | None = None) -> np.ndarray:
-        """Return |u| at distances (mm, (k, ...)) from the units numbered `drivers`, (k,), over that at their edges."""
-        found = np.zeros(distances.shape)
+    def motions(self, drivers: np.ndarray, ways: np.ndarray, end: dict[str, int] | None = None) -> np.ndarray:
+        """Return the motion at the end of ways (mm, (k, 2)) from the units numbered `drivers`, (k,), shape (k, 3).
+
+        Complex, in x, y and z, over |u| at the unit's edge. Every motor is in one phase.
+        """
+        found = np.zeros((len(drivers), 3), dtype=complex)
+        away, angle = np.hypot(ways[:, 0], ways[:, 1]), np.arctan2(ways[:, 1], ways[:, 0])
         for kind, one in enumerate(self.inputs):
             rows = self.kind[drivers] == kind
             if np.any(rows):
-                found[rows] = decay(one, 1e-3 * distances[rows], end=end)
+                found[rows] = in_axes(motion(one, 1e-3 * away[rows], end=end), angle[rows], one.drive)
         return found
 
     def both(self) -> np.ndarray:
-        """Return the decays to the centre and to the nearest edge, shape (n, n, 2), rows the unit that drives.
+        """Return |u| at the centre and at the nearest edge, shape (n, n, 2), rows the unit that drives.
 
-        0 for itself.
+        Over |u| at that unit's edge; 0 for itself.
         """
         away = np.stack([self.centre, self.edge], axis=-1)
         found = np.zeros(away.shape)
         drivers, moved = np.nonzero(~np.eye(len(self.kind), dtype=bool))
-        found[drivers, moved] = self.decays(drivers, away[drivers, moved])
+        for kind, one in enumerate(self.inputs):
+            rows = self.kind[drivers] == kind
+            i, j = drivers[rows], moved[rows]
+            if i.size:
+                found[i, j] = decay(one, 1e-3 * away[i, j])
         return found
 
-    def answer(
-        self, nearest: tuple[int, int] | None, worst: int, end: dict[str, int] | None = None
-    ) -> dict[str, np.ndarray]:
-        """Return the decay between the `nearest` two units, to centre and edge, and the sums at the place `worst`.
+    def sums(self, worst: int | None = None, end: dict[str, int] | None = None) -> dict[str, np.ndarray]:
+        """Return `SUMS` at each place from all others, shape (n, 3); with `worst` at that place alone, (1, 3).
 
-        Each is (3,): of bare skin, and times the least and the largest factor of `contact`.
+        Of bare skin, and times the least and the largest factor of `contact`. NaN for phases of several frequencies.
         """
-        if nearest is None:
-            return dict.fromkeys(("nearest_centre", "nearest_edge", "sum", "root_sum_of_squares"), np.zeros(3))
-        others = np.delete(np.arange(len(self.kind)), worst)
-        away = np.append(self.centre[others, worst], [self.centre[nearest], self.edge[nearest]])
-        drivers = np.append(others, [nearest[0], nearest[0]])
-        found = self.decays(drivers, away, end=end)
-        own = [self.inputs[kind] for kind in self.kind[drivers]]
-        factors = [contact(one.drive, mm - 500.0 * one.diameter) for one, mm in zip(own, away, strict=True)]
-        found = found * np.concatenate([np.ones((1, found.size)), np.array(factors).T])
-        return {
-            "nearest_centre": found[:, -2],
-            "nearest_edge": found[:, -1],
-            "sum": found[:, :-2].sum(axis=1),
-            "root_sum_of_squares": np.linalg.norm(found[:, :-2], axis=1),
-        }
+        count = len(self.kind)
+        places = np.arange(count) if worst is None else np.array([worst])
+        found = {key: np.zeros((places.size, 3)) for key in SUMS}
+        drivers, rows = np.nonzero(np.arange(count)[:, None] != places)
+        if not drivers.size:
+            return found
+        moved = self.motions(drivers, ways(self.array)[drivers, places[rows]], end)
+        low, high = np.ones((2, drivers.size))
+        for kind, one in enumerate(self.inputs):
+            own = self.kind[drivers] == kind
+            away = self.centre[drivers[own], places[rows[own]]]
+            low[own], high[own] = contact(one.drive, away - 500.0 * one.diameter)
+        for column, factor in enumerate((np.ones(drivers.size), low, high)):
+            scaled = moved * factor[:, None]
+            for row in range(places.size):
+                vectors = scaled[rows == row]
+                found["root_sum_of_squares"][row, column] = np.linalg.norm(vectors)
+                found["in_phase"][row, column] = np.linalg.norm(vectors.sum(axis=0)) if self.synchronous else np.nan
+                found["worst_phases"][row, column] = worst_phases(vectors) if self.synchronous else np.nan
+        return found
+
+    def nearest(self, pair: tuple[int, int] | None, end: dict[str, int] | None = None) -> dict[str, np.ndarray]:
+        """Return |u| at the centre and at the nearest edge of the second of two units, from the first, shape (3,).
+
+        Of bare skin, and times the least and the largest factor of `contact`.
+        """
+        if pair is None:
+            return dict.fromkeys(("nearest_centre", "nearest_edge"), np.zeros(3))
+        one = self.inputs[self.kind[pair[0]]]
+        away = np.array([self.centre[pair], self.edge[pair]])
+        found = decay(one, 1e-3 * away, end=end)
+        low, high = contact(one.drive, away - 500.0 * one.diameter)
+        rows = np.stack([found, found * low, found * high], axis=-1)
+        return {"nearest_centre": rows[0], "nearest_edge": rows[1]}
+
+
+def in_axes(found: np.ndarray, angle: np.ndarray, drive: Drive) -> np.ndarray:
+    """Return u_r, u_theta and u_z (3, k) at angles (rad, (k,)) as the motion in x, y and z, shape (k, 3).
+
+    A flat motor's force turns: its phase is that of the angle, and u_theta is a quarter turn ahead.
+    """
+    out, around, up = found
+    if drive == "flat":
+        out, around, up = np.exp(-1j * angle) * np.array([out, 1j * around, up])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([out * cos - around * sin, out * sin + around * cos, up], axis=-1)
+
+
+_STARTS, _TURNS = 8, 40
+
+
+def worst_phases(vectors: np.ndarray) -> float:
+    """Return the largest |sum| of complex vectors (k, 3) over the phase of each.
+
+    In a direction w the best phases give the sum of |w* v|; the largest sum is that of the best direction. Each pass
+    takes the phases for a direction and the direction of their sum, and never lowers it. It starts from the longest
+    vectors and from the axes.
+    """
+    size = np.linalg.norm(vectors, axis=1)
+    if not size.any():
+        return 0.0
+    longest = vectors[np.argsort(-size)[:_STARTS]]
+    totals = np.concatenate([longest, np.eye(3), vectors.sum(axis=0)[None]]).astype(complex)
+    for _ in range(_TURNS):
+        along = np.conj(totals) @ vectors.T
+        phases = np.divide(np.conj(along), np.abs(along), out=np.ones_like(along), where=np.abs(along) > 0)
+        totals = phases @ vectors
+    return float(np.linalg.norm(totals, axis=1).max())
 
 
 def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> dict[str, Any]:
@@ -127,11 +198,14 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
     say("crosstalk: decay")
     units = Decays(array)
     matrix = units.both()[..., 0]
-    sums = _sums(matrix)
-    nearest, worst = _nearest(units, matrix), int(np.argmax(np.round(sums["sum"], 9)))
+    sums = {key: found[:, 0] for key, found in units.sums().items()}
+    nearest, worst = _nearest(units, matrix), int(np.argmax(np.round(sums["root_sum_of_squares"], 9)))
     say("crosstalk: range")
     varied = {str(end): end for one in units.inputs for end in ends(one)}.values()
-    answers = [units.answer(nearest, worst, end=end) for end in (None, *varied)]
+    answers = [
+        units.nearest(nearest, end) | {key: one[0] for key, one in units.sums(worst, end).items()}
+        for end in (None, *varied)
+    ]
     ranged = {key: _quantity(np.array([one[key] for one in answers])) for key in answers[0]}
     names = [place.name for place in array.places]
     data: dict[str, Any] = {
@@ -154,25 +228,23 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
             "centre": ranged["nearest_centre"],
             "nearest_edge": ranged["nearest_edge"],
         },
-        "worst": {"place": names[worst], **{key: ranged[key] for key in _SUMS}},
-        "sums": {key: np.round(one, DIGITS).tolist() for key, one in sums.items()},
+        "synchronous": units.synchronous,
+        "worst": {"place": names[worst], **{key: ranged[key] for key in SUMS}},
+        "sums": {key: None if np.isnan(one).any() else np.round(one, DIGITS).tolist() for key, one in sums.items()},
         "matrix": [
             [None if i == j else value for j, value in enumerate(row)]
             for i, row in enumerate(np.round(matrix, DIGITS).tolist())
         ],
         "assumptions": ASSUMPTIONS,
-        "absolute": _absolute(units, matrix, worst, ranged),
+        "absolute": _absolute(units, worst, ranged),
     }
     return {**data, "answer": crosstalk_lines(data)}
 
 
-def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the amplitude at each place from all others, in phase and as the root of the sum of squares (n,)."""
-    return {"sum": matrix.sum(axis=0), "root_sum_of_squares": np.sqrt((matrix**2).sum(axis=0))}
-
-
-def _quantity(every: np.ndarray) -> dict[str, float]:
-    """Return a value with its range, of `Decays.answer` at the nominal tissue and at the ends, a row each."""
+def _quantity(every: np.ndarray) -> dict[str, float] | None:
+    """Return a value with its range, of `Decays` at the nominal tissue and at the ends, a row each; None for NaN."""
+    if np.isnan(every).any():
+        return None
     ends = {"value": every[0, 0], "low": every[:, 1].min(), "high": every[:, 2].max()}
     return {key: round(float(one), DIGITS) for key, one in ends.items()}
 
@@ -187,25 +259,28 @@ def _nearest(units: Decays, matrix: np.ndarray) -> tuple[int, int] | None:
     return i, j
 
 
-def _absolute(
-    units: Decays, matrix: np.ndarray, worst: int, ranged: Mapping[str, Mapping[str, float]]
-) -> dict[str, Any]:
+def _absolute(units: Decays, worst: int, ranged: Mapping[str, Mapping[str, float] | None]) -> dict[str, Any]:
     """Return the amplitude at the worst place from the others, in motors' amplitudes, as a range; or why there is none.
 
     The 80 % ranges of the units' levels at the edge, all at one end, times the decay at the same end of its range.
     """
-    answers = [estimate_spec(unit, (), layered=lambda variant: {})["answer"] for unit in units.array.units]
-    if any(one["p10"] is None for one in answers):
+    answers = [answer_spec(unit) for unit in units.array.units]
+    if any(one.low is None for one in answers):
         return {"reason": "the level of a unit is not known"}
-    levels = {end: np.array([one[point] for one in answers])[units.kind] for end, point in _ENDS.items()}
-    at_ends = {end: _sums(matrix * level[:, None]) for end, level in levels.items()}
-    return {
-        name: {
-            end: round(float(sums[name][worst]) * (ranged[name][end] / max(ranged[name]["value"], 1e-300)), DIGITS)
-            for end, sums in at_ends.items()
-        }
-        for name in _SUMS
-    }
+    levels = {end: np.array([getattr(one, end) for one in answers])[units.kind] for end in ("low", "high")}
+    others = np.delete(np.arange(len(units.kind)), worst)
+    moved = units.motions(others, ways(units.array)[others, worst]) if others.size else np.zeros((0, 3))
+    made: dict[str, Any] = {}
+    for end, level in levels.items():
+        vectors = moved * level[others][:, None]
+        found = {"root_sum_of_squares": float(np.linalg.norm(vectors))}
+        if units.synchronous:
+            found |= {"in_phase": float(np.linalg.norm(vectors.sum(axis=0))), "worst_phases": worst_phases(vectors)}
+        for name, size in found.items():
+            quantity = ranged[name]
+            assert quantity is not None
+            made.setdefault(name, {})[end] = round(size * (quantity[end] / max(quantity["value"], 1e-300)), DIGITS)
+    return made
 
 
 def crosstalk_csv(array: Array) -> bytes:
@@ -252,8 +327,7 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
         f"neighbour ({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
         f"and {_ranged(nearest['nearest_edge'], 100, ' %')} the neighbour's edge.",
         f"With all other units on, {most}: {_ranged(worst['root_sum_of_squares'])} times one "
-        f"unit's edge level if the motors are not synchronous (root of the sum of squares), and "
-        f"{_ranged(worst['sum'])} times if all are in phase.",
+        f"unit's edge level if the motors are not synchronous (root of squares){_phases(worst)}.",
         _absolute_line(worst["place"], data["absolute"]),
         IN_BRACKETS,
     ]
@@ -282,7 +356,7 @@ def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
 def _compared(data: Crosstalk) -> dict[str, float]:
     """Return the values that are compared; 0 for a single unit."""
     nearest = data["nearest"]["centre"]["value"] if data["nearest"] else 0.0
-    return {"nearest_centre": nearest, **{key: data["worst"][key]["value"] for key in _SUMS}}
+    return {"nearest_centre": nearest, **{key: (data["worst"][key] or {"value": 0.0})["value"] for key in SUMS}}
 
 
 def ratio_line(one: Mapping[str, Any]) -> str:
@@ -290,7 +364,8 @@ def ratio_line(one: Mapping[str, Any]) -> str:
     parts = {
         "nearest neighbour": one["nearest_centre"],
         "worst place, root of squares": one["root_sum_of_squares"],
-        "in phase": one["sum"],
+        "in one phase": one["in_phase"],
+        "worst phases": one["worst_phases"],
     }
     said = join_words(
         f"{change} x {number(value, 3, zeros=True)}" for change, value in parts.items() if value is not None
@@ -306,13 +381,26 @@ def _ranged(quantity: Mapping[str, float], factor: float = 1.0, unit: str = "") 
     return f"{value}{unit} ({low} to {high})"
 
 
+def _phases(worst: Mapping[str, Any]) -> str:
+    if worst["in_phase"] is None:
+        return ". The motors run at several frequencies: no phase lasts"
+    return (
+        f", {_ranged(worst['in_phase'])} times with all motors in one phase (complex sum), and at most "
+        f"{_ranged(worst['worst_phases'])} times at the worst phases"
+    )
+
+
 def _absolute_line(place: str, ranges: Mapping[str, Any]) -> str:
     if "reason" in ranges:
         return f"No absolute level: {ranges['reason']}."
-    each = (ranges["root_sum_of_squares"], ranges["sum"])
-    said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in each]
+    said = {key: f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for key, one in ranges.items()}
+    phases = (
+        f", {said['in_phase']} in one phase and {said['worst_phases']} at the worst phases"
+        if "in_phase" in said
+        else ""
+    )
     return (
-        f"At {place} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase. "
+        f"At {place} that is {said['root_sum_of_squares']} of the motor's own amplitude{phases}. "
         "The ranges combine those of the edge level and of the decay."
     )
 

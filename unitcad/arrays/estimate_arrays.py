@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,13 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.build_command import assumed_line, checks_line, to_open
-from unitcad.cli.output import console, print_indented, print_json, print_table, progress
+from unitcad.cli.output import print_indented, print_json, progress
+from unitcad.cli.tables import console, print_table
+from unitcad.documents import read_json
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.summary import assumed_line, checks_line, to_open
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
@@ -34,12 +35,12 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         yield from assumed_line(unit, given, array.paths_of(unit)[0])
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
-        lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))
+        lines = casting_summary(read_json(folder / "casting.json"))
         yield from (line for line in lines if line not in told)
     yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
-        yield from json.loads(crosstalk.read_bytes())["answer"][:2]
+        yield from read_json(crosstalk)["answer"][:2]
     yield from to_open(folder)
 
 
@@ -82,9 +83,12 @@ def estimate_arrays(
 def _print_details(data: Mapping[str, Any]) -> None:
     names, sums, matrix = [place["name"] for place in data["places"]], data["sums"], data["matrix"]
     if len(names) <= _MOST_PLACES:
-        each = zip(names, sums["root_sum_of_squares"], sums["sum"], strict=True)
-        rows = [{"unit": name, "root": number(root, 2), "sum": number(total, 2)} for name, root, total in each]
-        how = "root of the sum of squares, or sum in phase"
+        heads = {"root_sum_of_squares": "root of squares", "in_phase": "in one phase", "worst_phases": "worst phases"}
+        rows = [
+            {"unit": name, **{head: number(sums[key][i], 2) for key, head in heads.items() if sums[key]}}
+            for i, name in enumerate(names)
+        ]
+        how = "root of squares, in one phase (complex sum), at the worst phases"
         print_table(rows, f"sum of all other units there, times one unit's edge level: {how}")
     if 1 < len(names) <= _MOST_PAIRS:
         shares = [["-" if value is None else number(100 * value, 2) for value in row] for row in matrix]

@@ -23,6 +23,7 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import casting_summary
 from unitcad.catalogue import materials
 from unitcad.checks import check_moulds, check_unit
+from unitcad.documents import line_of
 from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
@@ -31,7 +32,7 @@ from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.raw import Table
-from unitcad.spec.toml import from_json, line_of, to_json
+from unitcad.spec.toml import from_json, to_json
 from unitcad.validation import templates
 from unitcad.validation.plain_data import at
 from unitcad.validation.suggestions import every_fault

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache
 from typing import NamedTuple
 
-from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
@@ -15,12 +14,11 @@ from unitcad.arrays.array_file import plan_tools, suggest_for_array
 from unitcad.arrays.circuit import has_circuit, lay_circuit
 from unitcad.arrays.constructions import Construction, construction_of
 from unitcad.arrays.sheet import at_place
-from unitcad.designs import Dimensions, unit_bodies
-from unitcad.designs.design import Fitting
+from unitcad.designs import unit_bodies
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import segment_count
-from unitcad.moulds.mould_set import MouldSet, geometric
-from unitcad.moulds.plan import Plan, Step
+from unitcad.moulds.mould_set import MouldSet, Origin, Solids, geometric
+from unitcad.moulds.plan import Plan
 from unitcad.shape import Shape, cut, cylinder, moved, rotated
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, to_json, with_formats
@@ -102,7 +100,7 @@ def _at_places(array: Array, part: PatchPart) -> tuple[Body, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PatchMoulds(MouldSet):
-    """The silicone of an array besides its units, as it is cast, and the tools and pours of it.
+    """The set of an array's patch: the silicone besides its units, as it is cast, and the tools and pours of it.
 
     `spec` is that of the array's unit with the patch's own layers (see `patch_moulds`): the lengths, silicones and lab
     for checks and procedure. Frame of the tools, mm.
@@ -110,151 +108,14 @@ class PatchMoulds(MouldSet):
 
     array: Array = field(kw_only=True)
 
-    @cached_property
+    @property
     def construction(self) -> Construction:
         """The way that the array is made."""
         return construction_of(self.array.construction, self.array.cast)
 
-    @cached_property
-    def blank(self) -> PatchMoulds:
-        """The same set with everything blank that the geometry does not read."""
-        spec = geometric(self.spec)
-        return self if spec == self.spec else PatchMoulds(spec, self.altered, array=self.array)
 
-    @cached_property
-    def geometry(self) -> str:
-        """The inputs of the geometry, as a text: places, sheet and lengths, no silicone and no name."""
-        array = self.array
-        distinct = [to_json(with_formats(geometric(unit))) for unit in array.units]
-        places = [(p.name, p.x, p.y, p.angle_deg, array.units.index(p.unit)) for p in array.places]
-        sheet = replace(array.sheet, material="")
-        reads = (array.construction, array.cast, array.radius_mm, distinct, places, sheet, array.circuit)
-        return f"{to_json(with_formats(geometric(self.spec)))} {reads!r}"
-
-    @cached_property
-    def unit(self) -> tuple[Body, ...]:
-        """The silicone as it is cast."""
-        return self.construction.bodies(self.array)
-
-    @property
-    def parts(self) -> tuple[str, Spec]:
-        """The array's own unit: those with several are cast apart."""
-        return "unit.", self.array.unit
-
-    @cached_property
-    def laid_later(self) -> tuple[Body, ...]:
-        """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
-        if self.construction.own_tails:
-            return ()
-        return tuple(body for body in patch_bodies(self.array) if body.kind in ("motor", "circuit"))
-
-    @cached_property
-    def pushed_in(self) -> tuple[Body, ...]:
-        """The units in the pockets, at their places over the sheet as it is cast."""
-        if not self.construction.own_tails:
-            return ()
-        low = self.array.sheet.low
-        return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.array)[1:])
-
-    @cached_property
-    def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
-        """The solids in the space of the patch, by name: of pockets the stretched sheet, and the units."""
-        if not self.construction.own_tails:
-            return super().together
-        solids: dict[str, list[Shape]] = {}
-        for body in patch_bodies(self.array):
-            solids.setdefault(body.name.partition("-")[0], []).append(body.shape)
-        return tuple((name, tuple(shapes)) for name, shapes in solids.items())
-
-    @cached_property
-    def cast_flat(self) -> PatchMoulds | None:
-        """The flat tools and pours of only the inner layers, if the last pour is cast around the limb; otherwise None.
-
-        Its silicone, motors and circuit are those of the whole array, laid flat.
-        """
-        plan, spec = self.plan, self.spec
-        if plan.standing(plan.steps[-1], "cup") or not plan.of_kind("cup"):
-            return None
-        steps, dims = plan.steps[:-1], plan.dimensions
-        standing = {name for step in steps for name in step.tools}
-        tools = tuple(tool for tool in plan.tools if tool.name in standing or tool.kind == "blade")
-        inner = replace(dims, radii=dims.radii[: len(steps)], heights=dims.heights[: len(steps)])
-        layers = spec.layers[: len(steps)]
-        return PatchMoulds(
-            structs.replace(spec, layers=layers),
-            replace(plan, tools=tools, steps=steps, dimensions=inner),
-            array=replace(self.array, cast="flat"),
-        )
-
-    @property
-    def makes(self) -> str:
-        """The casting out of the mould."""
-        return "sheet" if self.construction.own_tails else "patch"
-
-    @property
-    def across(self) -> str:
-        """The lengths to measure."""
-        x0, y0, x1, y1 = self.array.sheet.outline
-        if self.array.cast == "curved":
-            along, radius = y1 - y0, self.array.radius_mm or 0.0
-            return f"The sheet: {along:.2f} mm along the limb. Every unit sits on a tube of radius {radius:.2f} mm."
-        middles = ""
-        if len(self.array.places) > 1:
-            middles = f" Between the middles of neighbouring units: {self.array.pitch_mm:.2f} mm."
-        return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
-
-    @property
-    def poured_across(self) -> tuple[str, float]:
-        """The widest open surface of a pour: the sheet's longer side, mm."""
-        x0, y0, x1, y1 = self.array.sheet.outline
-        return "sheet", max(x1 - x0, y1 - y0)
-
-    def greased(self, step: Step) -> str:
-        """Return the faces that get petroleum jelly before a cup is put on, in the construction's words."""
-        return self.construction.greased(self.array, step.index)
-
-    @property
-    def source(self) -> str:
-        """The file in a result's folder that makes the result again."""
-        return "array.toml"
-
-    @property
-    def assembly(self) -> tuple[Fitting, ...]:
-        """How motors and circuit go in, in the construction's words."""
-        return self.construction.assembly(self.array)
-
-    def pieces(self, name: str) -> int:
-        """Return the number of solids that a body is drawn of: a layer of all units has one for each."""
-        return next((len(step.layer) for step in self.plan.steps if step.name == name), 1)
-
-    @cached_property
-    def plan(self) -> Plan:
-        """Tools and pours. Raises Refusal if the moulds can't be made."""
-        if self.altered:
-            return self.altered
-        try:
-            return plan_tools(self.array)
-        except Refusal as refusal:
-            raise suggest_for_array(refusal, self.array.asked) from None
-
-    @cached_property
-    def dimensions(self) -> Dimensions:
-        """The lengths that the tools are drawn to."""
-        return self.plan.dimensions
-
-    @cached_property
-    def segments(self) -> int:
-        """Sides of every full turn."""
-        return _segments(self.array)
-
-    @cached_property
-    def rib_spaces(self) -> Manifold:
-        """Empty: no cup of a patch is centred by ribs on a plinth."""
-        return Manifold()
-
-
-def patch_moulds(array: Array, altered: Plan | None = None, given: frozenset[str] = frozenset()) -> PatchMoulds:
-    """Return the mould set of an array's sheet; `altered` and `given`: see `MouldSet`.
+def patch_moulds(array: Array, plan: Plan | None = None, given: frozenset[str] = frozenset()) -> PatchMoulds:
+    """Return the mould set of an array's sheet; with a `plan` in place of its own. `given`: see `MouldSet`.
 
     Its spec has the unit's lengths, silicones and lab, and the sheet as its layers.
     """
@@ -265,4 +126,85 @@ def patch_moulds(array: Array, altered: Plan | None = None, given: frozenset[str
     entries = {name: entry for each in array.units for name, entry in each.materials.items()}
     moulds = structs.replace(unit.moulds, pour="open")  # units in pockets may be injected, their sheet is struck off
     own = {"name": array.name, "layers": layers, "materials": entries, "moulds": moulds}
-    return PatchMoulds(structs.replace(unit, fpcb=None, wires=None, **own), altered, given, array=array)
+    spec = structs.replace(unit, fpcb=None, wires=None, **own)
+    return PatchMoulds(spec, given, origin=_origin(array, plan), array=array)
+
+
+def _origin(array: Array, plan: Plan | None) -> Origin:
+    """Return what a patch's set is made from; with a `plan` in place of its own."""
+    way = construction_of(array.construction, array.cast)
+    distinct = [to_json(with_formats(geometric(unit))) for unit in array.units]
+    places = [(p.name, p.x, p.y, p.angle_deg, array.units.index(p.unit)) for p in array.places]
+    sheet = replace(array.sheet, material="")
+    reads = (array.construction, array.cast, array.radius_mm, distinct, places, sheet, array.circuit)
+    return Origin(
+        bodies=cache(lambda: way.bodies(array)),
+        plan=cache(lambda: plan or _plan(array)),
+        segments=lambda: _segments(array),
+        together=lambda: _together(array),
+        inner=lambda spec, made: _inner(array, spec, made),
+        reads=f" {reads!r}",
+        file="array.toml",
+        unit=array.unit,
+        path="unit.",  # those with several units are cast apart
+    )
+
+
+def _plan(array: Array) -> Plan:
+    """Return tools and pours, and what is made of the silicone. Raises Refusal if the moulds can't be made."""
+    try:
+        made = plan_tools(array)
+    except Refusal as refusal:
+        raise suggest_for_array(refusal, array.asked) from None
+    return _filled_in(array, made)
+
+
+def _filled_in(array: Array, made: Plan) -> Plan:
+    """Return a plan with what its silicone becomes: a sheet for units that are cast apart, or a whole patch."""
+    way, bodies = construction_of(array.construction, array.cast), patch_bodies(array)
+    x0, y0, x1, y1 = array.sheet.outline
+    across = f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent."
+    if array.cast == "curved":
+        radius = f"{array.radius_mm or 0.0:.2f}"
+        across = f"The sheet: {y1 - y0:.2f} mm along the limb. Every unit sits on a tube of radius {radius} mm."
+    elif len(array.places) > 1:
+        across += f" Between the middles of neighbouring units: {array.pitch_mm:.2f} mm."
+    steps = (replace(step, greased=way.greased(array, step.index), solids=len(step.layer)) for step in made.steps)
+    over = tuple(replace(body, shape=moved(body.shape, z=-array.sheet.low)) for body in bodies[1:])
+    return replace(
+        made,
+        steps=tuple(steps),
+        makes="sheet" if way.own_tails else "patch",
+        laid_later=() if way.own_tails else tuple(body for body in bodies if body.kind in ("motor", "circuit")),
+        pushed_in=over if way.own_tails else (),
+        assembly=way.assembly(array),
+        widest=("sheet", max(x1 - x0, y1 - y0)),
+        across=across,
+    )
+
+
+def _together(array: Array) -> Solids:
+    """Return the solids in the space of the patch, by name: of pockets the stretched sheet, and the units."""
+    way, bodies = construction_of(array.construction, array.cast), patch_bodies(array)
+    if not way.own_tails:
+        inside = (body for body in bodies if body.kind in ("motor", "circuit"))
+        return tuple((body.name, (body.shape,)) for body in (*way.bodies(array), *inside))
+    solids: dict[str, list[Shape]] = {}
+    for body in bodies:
+        solids.setdefault(body.name.partition("-")[0], []).append(body.shape)
+    return tuple((name, tuple(shapes)) for name, shapes in solids.items())
+
+
+def _inner(array: Array, spec: Spec, plan: Plan) -> PatchMoulds | None:
+    """Return the set of the flat tools and pours, if only the inner layers are cast flat; otherwise None.
+
+    Its silicone, motors and circuit are those of the whole array, laid flat.
+    """
+    if plan.standing(plan.steps[-1], "cup") or not plan.of_kind("cup"):
+        return None
+    steps, dims, flat = plan.steps[:-1], plan.dimensions, replace(array, cast="flat")
+    standing = {name for step in steps for name in step.tools}
+    tools = tuple(tool for tool in plan.tools if tool.name in standing or tool.kind == "blade")
+    lengths = replace(dims, radii=dims.radii[: len(steps)], heights=dims.heights[: len(steps)])
+    inner = _filled_in(flat, replace(plan, tools=tools, steps=steps, dimensions=lengths))
+    return PatchMoulds(structs.replace(spec, layers=spec.layers[: len(steps)]), origin=_origin(flat, inner), array=flat)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
-from scipy import special
 
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium, Response, components
 from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.lean_scipy import special
 
 EDGE_TO_MM = 30
 NO_RATIO = "the half-space contains no rings of silicone, so its curve does not depend on the layers"
@@ -92,19 +92,28 @@ def decay(
     hertz: float | None = None,
     end: Mapping[str, int] | None = None,
 ) -> np.ndarray:
-    """Return the bare skin's motion at `radii` (m, any shape) from a unit's middle, over that at its edge.
+    """Return the bare skin's |u| (`U_DEFINITION`) at `radii` (m, any shape) from a unit's middle, over that at its edge.
 
-    `drive`, `hertz`: default: those of the motor and the unit. `end`: as in `inputs.tissue_medium`, or "frequency".
-    The motion is |u| (`U_DEFINITION`), inside the edge too. One response serves all radii. Raises `Refusal` for values
-    that no tissue has.
+    `drive`, `hertz`: default: those of the motor and the unit. Otherwise as `motion`.
     """
     if hertz is not None:
         variant = replace(variant, frequency=Quantity(hertz))
+    return np.linalg.norm(motion(variant, radii, drive, end), axis=0)
+
+
+def motion(
+    variant: EstimateInput, radii: np.ndarray, drive: Drive | None = None, end: Mapping[str, int] | None = None
+) -> np.ndarray:
+    """Return the bare skin's u_r, u_theta and u_z (complex) over |u| at the unit's edge, shape (3, *radii.shape).
+
+    `radii`: m, any shape, inside the edge too. `end`: as in `inputs.tissue_medium`, or "frequency". One response serves
+    all radii. A flat motor's force turns: its point at theta moves by e^(-i theta) (u_r, i u_theta, u_z). Raises
+    `Refusal` for values that no tissue has.
+    """
     wanted = np.asarray(radii, dtype=float)
     medium, load, omega = _case(variant, drive or variant.drive, end or {})
     found = components(medium, load, omega, np.append(wanted.ravel(), variant.diameter / 2.0), _RTOL)
-    size = np.linalg.norm(found, axis=0)
-    return (size[:-1] / size[-1]).reshape(wanted.shape)
+    return (found[:, :-1] / np.linalg.norm(found[:, -1])).reshape(3, *wanted.shape)
 
 
 def _case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:

@@ -48,7 +48,8 @@ class Quantity(msgspec.Struct, frozen=True):
 class SiliconeLayer(msgspec.Struct, frozen=True):
     """A layer of the unit: wall thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio, tan delta.
 
-    `first` is its number in the spec, from 0, if that is not its place among the unit's layers.
+    `place`, `doubt`: of its silicone (`edge.contrast.place_of`). `first` is its number in the spec, from 0, if that is
+    not its place among the unit's layers.
     """
 
     material: str
@@ -57,6 +58,8 @@ class SiliconeLayer(msgspec.Struct, frozen=True):
     youngs_modulus: Quantity
     poisson_ratio: Quantity
     tan_delta: Quantity
+    place: float
+    doubt: float = 0.0
     first: int | None = None
 
 
@@ -117,12 +120,19 @@ class TissueLayer(msgspec.Struct, frozen=True):
     damping: Quantity
 
 
+class Feature(msgspec.Struct, frozen=True):
+    """A feature of a unit that no measured unit had, and its size (mm; degrees of a draft; 1 if it has none)."""
+
+    name: str
+    size: float = 1.0
+
+
 class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     """A unit on tissue: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
     `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force
     acts, turning in the skin's plane (flat) or along the motor's axis (axial); `moduli`: which ones the layers have;
-    `unread`: features of the unit that no model reads and no measured unit had.
+    `features`: those that no measured unit of the paper had and no model reads.
     """
 
     name: str
@@ -137,7 +147,7 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     amplitude: float | None = None
     drive: Drive = "flat"
     moduli: Literal["small-strain", "quasi-static"] = "small-strain"
-    unread: tuple[str, ...] = ()
+    features: tuple[Feature, ...] = ()
 
     @property
     def motor_diameter(self) -> float:

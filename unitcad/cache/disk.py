@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import platformdirs
 from filelock import FileLock
 
 from unitcad.cache.store import MissingContent, T, digest
+from unitcad.documents import parse_json
 from unitcad.errors import UnitcadError
 from unitcad.files import regular, write_new
 
@@ -154,7 +154,7 @@ class DiskStore:
                     with contextlib.suppress(OSError):
                         self._write(path, _checksum(kind, key, payload) + b"\n" + payload)
                     self.counts[f"{kind} built"] += 1
-                    return json.loads(payload)  # as the next reader gets it
+                    return parse_json(payload, str(path))  # as the next reader gets it
         self.counts[f"{kind} reused"] += 1
         self._touch(path)
         return found
@@ -169,7 +169,7 @@ class DiskStore:
         except UnitcadError:
             checksum = payload = b""
         if _checksum(kind, key, payload) == checksum:
-            data = msgspec.json.decode(payload)
+            data = parse_json(payload, str(path))
             return data if intact(data) else None
         remove(path)
         self.counts["damaged"] += 1
@@ -422,7 +422,7 @@ def _contents_of(entry: Path) -> list[str]:
     if entry.parent.parent.name != "files":
         return []
     try:
-        return [json.loads(read(entry).partition(b"\n")[2])["sha256"]]
+        return [parse_json(read(entry).partition(b"\n")[2], str(entry))["sha256"]]
     except (OSError, UnitcadError, ValueError, KeyError, TypeError):
         return []
 

@@ -127,7 +127,7 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
         note += "".join(f", {words}" for words in _ratings(motor))
     if not spec.motor.absent:
         yield Item(motor_name(spec), cells, "piece", "bought", note)
-    if any(body.kind == "circuit" for body in moulds.laid_later):
+    if any(body.kind == "circuit" for body in moulds.plan.laid_later):
         yield Item("flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say")
     if fpcb := spec.fpcb:
         sides = {"one": "one side", "both": "both sides"}.get(fpcb.tail, fpcb.tail)
@@ -168,7 +168,7 @@ def list_consumables(
         note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide"
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
     named = {"caliper", *(tool for step in steps for tool in step.required_tools)}
-    lidded = [batch for batch in batches if batch.step.lid]
+    lidded = [batch for batch in batches if batch.step.injected]
     strips = 2 * (len(tape_places(moulds)) if cups else 0) * sum(not step.lid for step in moulds.plan.steps)
     if strips:
         named.discard("adhesive tape")  # its strips are on the list

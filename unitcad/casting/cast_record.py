@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from unitcad import files
 from unitcad.catalogue.entries import between
+from unitcad.documents import read_json
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import convert
 from unitcad.spec.raw import Table
@@ -117,7 +117,7 @@ def read_cast_record(path: Path, *, links: bool = True) -> CastRecord:
 
     Raises UnitcadError if the file can't be read, Refusal for the first value that is not valid.
     """
-    data = files.read_json(path, largest=LARGEST, links=links)
+    data = read_json(path, largest=LARGEST, links=links)
     if not isinstance(data, dict):
         raise UnitcadError(f"{path}: is not a cast record: it has no table")
     if data.get("format") != FORMAT:

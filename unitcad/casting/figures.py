@@ -130,12 +130,12 @@ def pot_life(material: Material, room_c: float) -> float | None:
     return at_room(float(material.pot_life_min), room_c) if material.pot_life_min else None
 
 
-def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
+def mix(spec: Spec, material: Material, volume_mm3: float, *, injected: bool) -> Mix:
     """Return the weights for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
     casting, ratio = spec.casting, float(for_casting(material, "mix_ratio"))
     net = volume_mm3 * float(material.density_g_cm3) / 1000
     density = float(material.density_g_cm3)
-    syringe = net / density + HELD_BACK_ML if spec.moulds.pour == "injected" else 0.0
+    syringe = net / density + HELD_BACK_ML if injected else 0.0
     # The waste remains in the mixing cup; the rest in the syringe comes on top.
     total = max(net * (1 + casting.waste) + (HELD_BACK_ML * density if syringe else 0.0), casting.minimum_mix_g)
     share = ratio / (1 + ratio)
@@ -217,8 +217,8 @@ class Batch:
     @cached_property
     def mix(self) -> Mix:
         """Weights for all cavities and channels."""
-        poured = self.volume_mm3 * len(self.step.layer) / self.moulds.pieces(self.step.name)
-        return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3)
+        poured = self.volume_mm3 * len(self.step.layer) / self.step.solids
+        return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3, injected=self.step.injected)
 
     @property
     def channels_mm3(self) -> float:
@@ -260,7 +260,7 @@ class Batch:
         """
         if self.pot_min is None:
             return 0.0
-        allowed, injected = WITHOUT_VACUUM * self.pot_min, self.moulds.spec.moulds.pour == "injected"
+        allowed, injected = WITHOUT_VACUUM * self.pot_min, self.step.injected
         rise = math.inf if self.rise_min is None else self.rise_min
         return min(rise, allowed) if injected or rise <= allowed else 0.0
 
@@ -284,7 +284,6 @@ class Batch:
     @property
     def verdict(self) -> str:
         """How bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
-        lid = self.step.lid
         if self.vacuum:
             said = (
                 f"Degas for {number(DEGASSING_MIN, 3)} min at {number(VACUUM_INHG, 3)} inHg: it foams up and falls "
@@ -292,11 +291,11 @@ class Batch:
             )
         else:
             rise, pot = self.rise_min, self.pot_min
-            where = "stand the syringe up, its tip up," if lid else "leave the mould alone"
+            where = "stand the syringe up, its tip up," if self.step.injected else "leave the mould alone"
             brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
             wait = "a quarter of the pot life" if pot is None else f"{number(WITHOUT_VACUUM * pot, 2)} min"
             stand = f"{where} for {wait}, push out the air, and inject slowly"
-            way_out = f"get a vacuum, or {stand if lid else brush}"
+            way_out = f"get a vacuum, or {stand if self.step.injected else brush}"
             if rise is None or pot is None:
                 lacks = join_words(self.unknown)
                 said = f"No vacuum, and no source gives the {lacks}, so bubbles may stay: {way_out}."
@@ -325,7 +324,7 @@ class Batch:
         practice = "assumed: usual practice"
         channels = " + sprue and vents" if step.channels else ""
         # An array's layers are drawn of all units together.
-        whole = len(step.layer) // self.moulds.pieces(step.name) != cells
+        whole = len(step.layer) // step.solids != cells
         what, times = ("volume of this pour", "volume") if whole else ("volume of one layer", "volume x cavities")
         taken = f"({times}{channels})" if channels or not whole else times
         more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
@@ -334,6 +333,7 @@ class Batch:
         ratio = f"mix ratio, {source_text(for_casting(silicone, 'mix_ratio'))}"
         cure = source_text(for_casting(silicone, "cure_h"))
         pot, viscosity = silicone.pot_life_min, silicone.mixed_viscosity_cps
+        pot_min, rise_min = self.pot_min, self.rise_min
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
@@ -345,12 +345,12 @@ class Batch:
             ("part A", mix.part_a_g, "g", ratio),
             ("part B", mix.part_b_g, "g", ratio),
             ("scale's error on a part", mix.mix_error_pct, "%", digit),
-            pot and ("pot life in this room", self.pot_min, "min", by_temperature + source_text(pot)),
+            pot and pot_min and ("pot life in this room", pot_min, "min", by_temperature + source_text(pot)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),
             viscosity and ("viscosity, mixed", float(viscosity), "cps", source_text(viscosity)),
             ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
-            viscosity and (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
+            rise_min and (f"rise of a {BUBBLE_MM} mm bubble through it", rise_min, "min", stokes),
             self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
@@ -410,6 +410,8 @@ def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
 
     They are those of the cured unit: silicone shrinks from the tools' lengths.
     """
+    if moulds.plan.way:
+        return []  # the body may stand on its side
     dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
     seat = -moulds.plate[0]
     below = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)

@@ -13,7 +13,11 @@ def fittings(moulds: MouldSet) -> tuple[Fitting, ...]:
 
     If none of them places motor and circuit, the last one shows them in place.
     """
-    found = moulds.assembly or _usual(moulds)
+    given = moulds.plan.assembly
+    if given is None:
+        words = moulds.design.assembly(moulds.spec, moulds.dimensions)
+        given = tuple(each if isinstance(each, Fitting) else Fitting(each) for each in words)
+    found = given or _usual(moulds)
     if found and not any(fitting.place for fitting in found):
         return (*found[:-1], replace(found[-1], place="home"))
     return found

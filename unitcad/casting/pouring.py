@@ -87,7 +87,7 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
             minutes=1.0 * cells,
             required_tools=("petroleum jelly",),
         )
-    if flanks := moulds.greased(step):
+    if flanks := step.greased:
         yield BenchStep(
             "Grease the flanks",
             f"Smear petroleum jelly on {flanks}: a film that shines, no beads. It keeps silicone out of the slits "
@@ -154,7 +154,7 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
         yield _cup_held(moulds, n, picture("hold"))
     if dry:
         yield from mixing_steps(batch)
-    if step.lid:
+    if step.injected:
         yield from injection_steps(batch, picture("inject"))
     else:
         if cells == 1 or len(step.layer) > 1:
@@ -184,7 +184,7 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
             ("stiff card or plastic",) if strip else (),
         )
     touched = (
-        "the bead on a vent" if step.lid else f"the silicone in {groove}" if step.groove else "what was struck off"
+        "the bead on a vent" if step.injected else f"the silicone in {groove}" if step.groove else "what was struck off"
     )
     yield cure(batch, touched, "layer", picture("filled"))
     if tongues:
@@ -219,13 +219,14 @@ def pour_steps(batch: Batch) -> Iterator[BenchStep]:
             "little."
         )
     back = "from the skin's side" if step is plan.steps[-1] else "and put it back"
+    trimmed = " Sprue and vents tear off: trim them flush with a knife." if step.gated else ""
     yield BenchStep(
         f"Cup {n} off",
         f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. Layer {n} should stay on "
-        f"the {holds(moulds)}: if it comes off in the cup, push it out {back}.",
+        f"the {holds(moulds)}: if it comes off in the cup, push it out {back}.{trimmed}",
         picture("cup-off"),
         minutes=LIFT_MIN,
-        required_tools=("blunt spatula",) if split else (),
+        required_tools=("blunt spatula",) if split else ("sharp knife",) if step.gated else (),
     )
 
 
@@ -405,13 +406,13 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
             )
         yield BenchStep(
             "Base off, downwards",
-            f"Remove its tape or bands. Leave {cup} on: silicone lies over it. {levered} The {moulds.makes} "
+            f"Remove its tape or bands. Leave {cup} on: silicone lies over it. {levered} The {moulds.plan.makes} "
             f"stays in {cup}.",
             picture_path("base-off"),
             minutes=LIFT_MIN * 2,
             required_tools=("blunt spatula",) if split else (),
         )
-    film = " and the blade's film" if moulds.spec.moulds.pour == "open" else ""
+    film = "" if last.injected else " and the blade's film"
     title, what, out, path = (
         "Peel off",
         "unit's edge",
@@ -419,7 +420,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
         "peel",
     )
     if CAST in removed:
-        title, what, path = "Push out", f"edge of the {moulds.makes}", "push-out"
+        title, what, path = "Push out", f"edge of the {moulds.plan.makes}", "push-out"
         out = f". Push it up out of {cup} from below with the thumbs, first at the edge, then unit by unit"
     yield BenchStep(
         title,
@@ -443,7 +444,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         path = picture_path(f"motor-{fitting.place}") if fitting.place else ""
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, required_tools=fitting.required_tools)
-    mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
+    mouth, motor = ("cavity's mouth", "motor") if moulds.plan.makes == "unit" else ("cavities' mouths", "motors")
     up = f"the {mouth} up" if moulds.design.opens == "below" else "its skin side down"
     ring = next((fitting for fitting in steps if fitting.mixed), None)
     if ring:
@@ -457,7 +458,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         return
     yield BenchStep(
         f"Let the {what} cure",
-        f"{said} Lay the {moulds.makes} level, {up}; don't run the {motor} before.",
+        f"{said} Lay the {moulds.plan.makes} level, {up}; don't run the {motor} before.",
         picture_path("motor-home"),
         kind="cure",
         wait_min=60 * hours,
@@ -549,7 +550,7 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
     """
     spec, dims, off, exit = moulds.spec, moulds.dimensions, eccentricity(moulds), moulds.dimensions.exit
     layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
-    drawn = dims.heights[-1]
+    drawn = dims.heights[-1] if moulds.plan.concentric else moulds.height
     high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)
     by_layers = f" ({shown(drawn, 2)} drawn, {layers})" if high != drawn else ""
     over = f", with the skin {shown(high + dims.skin, 2)} mm" if dims.skin else ""
@@ -563,17 +564,17 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
             f"{further if len(masses_g) > 1 else ''}."
         )
     else:
-        yield moulds.across
+        yield moulds.plan.across
     if exit:
         opening = "notch" if exit.high >= dims.heights[0] else "slot"
         size = f"{shown(exit.width, 2)} wide, {shown(exit.height, 2)} high"
         yield f"The {opening}: {size}, open all the way."
     weights = " + ".join(shown(each) for each in masses_g) + (f" = {shown(sum(masses_g))}" if len(masses_g) > 1 else "")
-    low = "" if spec.moulds.pour == "injected" else " or a low strike"
-    motor = "motor" if moulds.makes == "unit" else "motors"
+    low = "" if moulds.plan.steps[-1].injected else " or a low strike"
+    motor = "motor" if moulds.plan.makes == "unit" else "motors"
     without = "" if spec.motor.absent else f", without {motor} and circuit"
     closed = f", with the skin {shown(sum(masses_g) + skin_g)} g" if skin_g else ""
-    weighed = f"Weigh one {moulds.makes}, trimmed{without}: {weights} g{closed}."
+    weighed = f"Weigh one {moulds.plan.makes}, trimmed{without}: {weights} g{closed}."
     if moulds.design.laid_in:
         weighed = (
             f"The silicone of one unit, trimmed, weighs {weights} g{closed}. What was laid in comes on top: weigh that "

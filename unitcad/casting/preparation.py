@@ -135,7 +135,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
         how.append(f"New printer: print the fit coupon (unitcad coupon {lengths.printer}).")
     return Printing(
         sizes(moulds),
-        moulds.source,
+        moulds.source.file,
         tuple(files),
         minutes,
         cm3,
@@ -146,7 +146,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
 
 def sizes(moulds: MouldSet) -> tuple[Size, ...]:
     """Return the lengths of bought parts that the tools are drawn for."""
-    path, spec = moulds.parts
+    path, spec = moulds.source.path, moulds.source.unit
     assumed = moulds.assumed
     lengths = {} if spec.motor.absent else {f"motor.{size}": getattr(spec.motor, size) for size in MOTOR_SIZES}
     if spec.fpcb:
@@ -241,7 +241,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     # The first whose rim takes a level: nothing on the base is higher.
     cup = spaced(next((step for step in plan.steps if step.rim >= core - 1e-9), plan.steps[-1]).cup)
     enough, tool = fall(moulds)
-    if lengths.pour == "injected":
+    if plan.steps[-1].injected:
         enough, tool = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents.", "level"
     yield level(
         f"Put the base in its final place, {cup} on it. Lay a level on the rim, along and across, and shim the base's "
@@ -319,7 +319,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
 
 def fall(moulds: MouldSet) -> tuple[str, str]:
     """Say which level is good enough for an open pour, and what error remains; return the level among the tools too."""
-    what, wide = moulds.poured_across
+    what, wide = moulds.plan.widest or ("cavity", 2 * moulds.dimensions.outer_radius)
     left = {name: wide * math.tan(math.radians(tilt)) for name, tilt in GOOD_DEG.items()}
     name = next((name for name, error in left.items() if error <= DENT), list(left)[-1])
     turned, tool = (", turned end for end,", "spirit level") if name != "a phone" else ("", "level")

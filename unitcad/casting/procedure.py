@@ -22,6 +22,7 @@ from unitcad.casting.preparation import Printing, preparation, printing
 from unitcad.casting.steps import BenchStep, Phase, phases
 from unitcad.casting.troubles import Trouble, troubles
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.rooms import load
 from unitcad.validation import warnings
 
 
@@ -114,12 +115,13 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         Batch(moulds, step, known[step.material], volume, cells)
         for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True)
     ]
-    pours = tuple(pour_of(batch, pour_steps(batch)) for batch in batches)
+    own = {name: load(f"{plan.bench}:{name}") for name in ("preparation", "pour_steps", "release") if plan.bench}
+    pours = tuple(pour_of(batch, own.get("pour_steps", pour_steps)(batch)) for batch in batches)
     silicones = [batch.silicone for batch in batches]
     grams = [batch.volume_mm3 * float(batch.silicone.density_g_cm3) / 1000 for batch in batches]
     skin_g = film_mm3(moulds) * float(silicones[-1].density_g_cm3) / 1000
-    prepared = tuple(preparation(moulds, list(dict.fromkeys(silicones))))
-    out = tuple(release(moulds, silicones[0]))
+    prepared = tuple(own.get("preparation", preparation)(moulds, list(dict.fromkeys(silicones))))
+    out = tuple(own.get("release", release)(moulds, silicones[0]))
     motor, skin = tuple(motor_in(moulds, silicones)), tuple(skin_on(moulds, silicones))
     last = " and ".join(["motor in"] * bool(motor or not skin) + ["skin on"] * bool(skin))
     motor += skin
@@ -138,9 +140,9 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         release=out,
         assembly=motor,
         measure=tuple(measurements(moulds, grams, skin_g)),
-        warnings=tuple(warnings(spec, estimate=False)) if moulds.makes == "unit" else (),
+        warnings=tuple(warnings(spec)) if plan.makes == "unit" else (),
         troubles=troubles(moulds),
-        makes=moulds.makes,
+        makes=plan.makes,
         bill=bill(moulds, batches, every, after),
         last=last.capitalize(),
         later_mixes=len(after),

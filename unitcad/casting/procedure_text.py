@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import msgspec
 
@@ -17,19 +16,12 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep, Phase, duration, number_steps
 from unitcad.casting.troubles import TROUBLES, troubles_markdown
 from unitcad.export import svg
-from unitcad.json_text import all_finite
+from unitcad.json_text import rounded_json
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.tree import Body
 from unitcad.text import join_words, markdown, number, spaced
 
-
-def _nine_digits(text: str) -> float:
-    """Return a number to nine significant digits; with its point or exponent a short text has no more."""
-    return float(text) if len(text) <= 10 else float(f"{float(text):.9g}")
-
-
-_NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
 UNPRINTED = "Nobody has printed this tooling yet."
 
 
@@ -62,11 +54,7 @@ def _shortened(procedure: Procedure) -> Procedure:
 
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
-    data = msgspec.to_builtins(procedure)
-    if not all_finite(data):  # msgspec writes numbers that are not finite as null
-        raise ValueError("a number of the procedure is not finite")
-    rounded = _NINE_DIGITS.decode(msgspec.json.encode(data))
-    return msgspec.json.format(msgspec.json.encode(rounded), indent=1).decode() + "\n"
+    return rounded_json(msgspec.to_builtins(procedure))
 
 
 def to_markdown(procedure: Procedure) -> str:

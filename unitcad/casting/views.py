@@ -47,6 +47,7 @@ from unitcad.moulds.lid import films
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step, place_in_cell
+from unitcad.rooms import load
 from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.extent import extent
 from unitcad.shape.tree import Body
@@ -115,6 +116,8 @@ def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
                 box = bounds(moulds.mesh_of(shape)) if view.group == "curved" else extent(shape)
                 moving.setdefault(item.moved, []).append(box)
     for (dx, dy, dz), boxes in moving.items():
+        if not (dx or dz):
+            continue  # it would point at the eye
         (x0, y0, z0), (x1, _, z1) = np.min(boxes, axis=0)[:3].tolist(), np.max(boxes, axis=0)[3:].tolist()
         x, z = (x0 + x1 + dx) / 2, (z0 + z1 + dz) / 2
         if not dz:
@@ -130,7 +133,7 @@ def shapes(moulds: MouldSet, item: Placed | Extra, unit: bool) -> list[tuple[Sha
         return [(item.shape, item.colour)]
     plan = moulds.plan
     if unit:
-        bodies = *moulds.unit, *moulds.laid_later, *moulds.pushed_in
+        bodies = *moulds.unit, *moulds.plan.laid_later, *moulds.plan.pushed_in
     else:
         bodies = dict.fromkeys((*plan.tools, *made_pieces(moulds), *plan.steps[-1].inserts))
     cast = [(step, shape) for step in plan.steps if step.name == item.name and not unit for shape in step.layer]
@@ -149,14 +152,23 @@ def pour_picture(pour: int, name: str) -> str:
 
 
 def _views(moulds: MouldSet) -> Views:
-    plan, bottom = moulds.plan, moulds.plate[0]
+    plan = moulds.plan
     yield "pieces", View(place_pieces(made_pieces(moulds)), eye=OVER, group="pieces")
-    if moulds.cast_flat:
-        yield from _curved(moulds, moulds.cast_flat, views(moulds.cast_flat))
+    if moulds.inner:
+        yield from _curved(moulds, moulds.inner, views(moulds.inner))
         return
+    if plan.bench:
+        yield from load(f"{plan.bench}:views")(moulds)
+        return
+    yield from cup_views(moulds)
+
+
+def cup_views(moulds: MouldSet) -> Views:
+    """Yield the views of moulds with cups that lift off, after that of their pieces; or of a tray."""
+    plan, bottom = moulds.plan, moulds.plate[0]
     base, first = place_pieces(plan.of_kind("base")), plan.steps[0]
     if not plan.of_kind("cup"):
-        yield from _tray(moulds, base, first)
+        yield from tray_views(moulds, base, first)
         return
     pressed = arrow(DOWN, 0.0, -0.8 * plan.layout.cup[1], first.rim + 5, 8.0)
     yield "dry-fit", View((*base, Placed(first.cup)), (pressed,), names=(_corner(moulds, first.rim),))
@@ -186,7 +198,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
     if moulds.design.laid_in == step.index:
         yield "laid-in", View((*cured, *place_pieces(step.inserts, z=2 * CLEAR)))
     cured = *cured, *place_pieces(step.inserts)
-    if moulds.greased(step):
+    if step.greased:
         meshes = [mesh for mesh in moulds.meshes(step.seals[:1]) if not mesh.is_empty()]
         points = [max(np.asarray(arrays(mesh)[0], float).tolist(), key=np.array(ABOVE).dot) for mesh in meshes]
         yield (
@@ -225,6 +237,11 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         yield "lid-on", View((*closed, off), (*on, grease_on_rim(moulds, step)), names=(grease,))
         held = *on, *bands(cup_x, lay.plate[1], bottom, step.top)
         yield from _injected(moulds, step, (*closed, Placed(step.lid)), held, cup_x - 2.0)
+        held = *held, Extra(union(step.channels), colour)
+    elif step.gated:
+        held = *on, *tape(moulds, step)
+        yield "hold", View(closed, held)
+        yield from injected_views(moulds, step, closed, held)
         held = *held, Extra(union(step.channels), colour)
     else:
         held = *on, *tape(moulds, step)
@@ -269,6 +286,13 @@ def _injected(
     """Yield the views of a lid that is held down, filled and cured, with a band at x = `band`."""
     names = (Name("rubber band", (band, 0.0, step.top + 1)),)
     yield "lid-held", View(closed, held, group=group, names=names)
+    yield from injected_views(moulds, step, closed, held, group)
+
+
+def injected_views(
+    moulds: MouldSet, step: Step, closed: tuple[Placed, ...], held: tuple[Extra, ...], group: Group = "moulds"
+) -> Views:
+    """Yield the views of a closed mould that is injected and cured."""
     # Of the second cavity, if there are several: clear of the syringe. The vent nearest the eye.
     count = len(step.channels) // len(step.layer)
     first = count if len(step.channels) > count else 0
@@ -321,11 +345,11 @@ def _demoulding(moulds: MouldSet) -> Views:
 def _motor_in(moulds: MouldSet) -> Views:
     """Yield the views of motor and circuit going in: a unit that opens to the skin is on its back."""
     steps, dims = fittings(moulds), moulds.dimensions
-    inside = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
+    inside = [body for body in (*moulds.unit, *moulds.plan.laid_later) if body.made != "cast"]
     if not inside or moulds.design.laid_in:
         return
     below, places = moulds.design.opens == "below", {fitting.place for fitting in steps}
-    cast = place_pieces((body for body in moulds.unit if body.kind == "layer"), half=not moulds.laid_later)
+    cast = place_pieces((body for body in moulds.unit if body.kind == "layer"), half=not moulds.plan.laid_later)
     eye = UNDER if below else LOW
 
     def view(parts: Iterable[Placed], extras: tuple[Extra, ...] = (), way: int = -1) -> View:
@@ -349,7 +373,7 @@ def _motor_in(moulds: MouldSet) -> Views:
     if "in" in places:
         yield "motor-in", view(place_pieces(inside, z=away), leads)
     if "home" in places or any(fitting.mixed or ADHESIVE in fitting.required_tools for fitting in steps):
-        whole = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
+        whole = [body for body in (*moulds.unit, *moulds.plan.laid_later) if body.made != "cast"]
         yield "motor-home", view(place_pieces(whole))
 
 
@@ -379,7 +403,7 @@ def _skin_on(moulds: MouldSet) -> Views:
     yield "skin-cure", View((*trays, *units), (film, *within), way=0)
 
 
-def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
+def tray_views(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
     """Yield the views of the one pour of a tray, a mould without cups."""
     x, lengths = moulds.plan.layout.plate[0], moulds.spec.moulds
     filled = *tray, *place_pieces([step])
@@ -393,13 +417,13 @@ def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
     up = step.rim + 2 * CLEAR
     yield "peel", View((*tray, *place_pieces([step], z=up)), way=1)
     if cast := {
-        body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.pushed_in if body.made == "cast"
+        body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.plan.pushed_in if body.made == "cast"
     }:
         # The sheet, its back up, and the units under their pockets, each named by its place.
         down = max(high for *_, high in cast.values()) + CLEAR
         middles = {name: ((box[0] + box[3]) / 2, (box[1] + box[4]) / 2, step.rim) for name, box in cast.items()}
         names = tuple(Name(name, at, on=True) for name, at in middles.items())
-        parts = *place_pieces(moulds.unit), *place_pieces(moulds.pushed_in, z=-down)
+        parts = *place_pieces(moulds.unit), *place_pieces(moulds.plan.pushed_in, z=-down)
         yield "units-in", View(parts, (), OVER, "unit", names=names)
 
 
@@ -472,7 +496,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
         parts = *apart, (cut(whole, rest), last.direction)
         extras += [Extra(part, layer_colour(pour), _along(way, up)) for part, way in parts]
     yield "peel", View(place_pieces([base]), tuple(extras), group="curved", way=1)
-    bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.laid_later)}
+    bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.plan.laid_later)}
     for name in ("motor-in", "motor-home"):
         # Flat parts here have the names of those cast round the limb: they are drawn by their shapes.
         shapes = (Extra(bodies[part.name].shape, bodies[part.name].colour, part.moved) for part in flat[name].parts)

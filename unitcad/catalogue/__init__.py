@@ -15,7 +15,6 @@ Examples
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from difflib import SequenceMatcher, get_close_matches
 from functools import cache
@@ -42,6 +41,7 @@ from unitcad.catalogue.entries import (
     kinds_of,
     required_of,
 )
+from unitcad.documents import parse_toml
 from unitcad.errors import Refusal, unknown_name
 from unitcad.text import measured, some
 
@@ -306,7 +306,9 @@ def _entries(kind: type[_Entry], own: Mapping[str, Struct] | None) -> dict[str, 
 def _after(kind: type[_Entry], table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a table, those of the shipped entry that it is `like`, if any, before its own."""
     base = table.get("like")
-    return {**(_after(kind, _raw(_KINDS[kind][0])[base]) if base else {}), **_with_sources(kind, table)}
+    if not base:
+        return _with_sources(kind, table)
+    return {**_after(kind, _raw(_KINDS[kind][0])[base]), **_with_sources(kind, table), "like": base}
 
 
 @cache
@@ -317,7 +319,7 @@ def _read_shipped(kind: type[_Entry]) -> dict[str, _Entry]:
 
 @cache
 def _raw(file: str) -> dict[str, Any]:
-    return tomllib.loads((files("unitcad.catalogue") / file).read_text("utf-8"))
+    return parse_toml((files("unitcad.catalogue") / file).read_text("utf-8"), file)
 
 
 def _plain(table: Any) -> dict[str, Any]:
@@ -341,7 +343,7 @@ def _entry(kind: type[Struct], name: str, table: Mapping[str, Any], path: str) -
         others = f" with {', '.join(missing[1:])}" if missing[1:] else ""
         like = "" if kind is Tissue else ", or like with the name of a shipped entry"
         raise Refusal(f"{path}.{missing[0]}", None, f"is required{others}{like}")
-    entry = msgspec.convert({"name": name, **_with_sources(kind, table)}, kind)
+    entry = msgspec.convert({"name": name, "like": table.get("like"), **_with_sources(kind, table)}, kind)
     for key, _ in kinds_of(kind):
         value = getattr(entry, key)
         if value is not None:

@@ -112,6 +112,7 @@ class Material(Struct, frozen=True, kw_only=True):
     """
 
     name: str
+    like: str | None = None
     density_g_cm3: Value[Annotated[float, between(0.1, 25, "density of the cured silicone")]]
     casting_floor_mm: Value[Annotated[float, between(0.01, 100, "thinnest wall that pours and demoulds")]] = _FLOOR
     poisson_ratio: Value[Poisson] = _INCOMPRESSIBLE

@@ -1,7 +1,7 @@
 """C100: the cavity between tools and earlier layers is the layer, and nothing more.
 
 It compares the drawn unit with the drawn tools, and does not know how either was drawn. In bodies from a file it
-ignores films that are no thicker than their facets' distance from the surface.
+ignores films that are no thicker than twice their facets' distance from the surface.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.designs.dimensions import growth
 from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity
-from unitcad.moulds.lid import films
+from unitcad.moulds.complement import films
+from unitcad.moulds.lid import films as skin_films
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import cylinder, moved
 from unitcad.shape.extent import extent
@@ -23,8 +24,9 @@ SHRUNK = 2e-4
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Compare the space that silicone can reach with the layer, in every cavity, and with the film in a skin's tray."""
+    least = films(moulds.spec) if moulds.facets else 0.0
     for cavity in moulds.cavities:
-        yield _of_cavity(cavity, moulds.facets)
+        yield _of_cavity(cavity, least)
     if moulds.spec.moulds.shrinkage_percent:
         for step in moulds.plan.steps:
             cast, cured = moulds.mesh_of(step.layer[0]).volume(), moulds.solids[step.name].volume()
@@ -34,7 +36,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         solid, dims = moulds.mesh(tray), moulds.plan.dimensions
         rim, reach = dims.heights[-1], dims.outer_radius + moulds.spec.moulds.land_mm / 2
         floor = extent(tray.shape)[2]
-        for i, (cell, drawn) in enumerate(zip(moulds.plan.layout.cells, films(moulds.frame), strict=True), 1):
+        for i, (cell, drawn) in enumerate(zip(moulds.plan.layout.cells, skin_films(moulds.frame), strict=True), 1):
             film = moulds.mesh_of(drawn)
             column = realise(moved(cylinder(reach, floor, rim), cell.x, cell.y), moulds.segments)
             hollow = column - solid
@@ -42,14 +44,14 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             yield at_most("C100", f"{tray.name} cell {i}", differ / film.volume(), BALANCE, "share of the film")
 
 
-def _of_cavity(cavity: Cavity, facets: float) -> MouldFinding:
+def _of_cavity(cavity: Cavity, least: float) -> MouldFinding:
     drawn, reached = cavity.drawn, cavity.reached
     # The difference, both ways.
     differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
     if differ > BALANCE * drawn.volume():
         # Of solids that are alike but for a rounding, the intersection can be larger than either: a second opinion.
         rests = reached - drawn, drawn - reached
-        differ = sum(piece.volume() for rest in rests for piece in (thick_pieces(rest) if facets else [rest]))
+        differ = sum(piece.volume() for rest in rests for piece in (thick_pieces(rest, least) if least else [rest]))
     return at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
 
 

@@ -5,6 +5,9 @@ Removed pieces are ignored. An order that can't be followed is a finding too.
 A piece that moves up passes through all that is over its upward faces. So the test is exact for any polyhedron: prisms
 over the faces that face along the way, cut with each piece that stays. No height is sampled. If pieces overlap at the
 start, silicone has taken the tool's real shape.
+
+A piece of a parted mould may press silicone aside as it comes off. The depth is the diameter of the largest circle in
+the shadow of the silicone in the way; the strain is twice that depth over the silicone's width there.
 """
 
 from __future__ import annotations
@@ -17,12 +20,14 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
-from unitcad.kernels.mesh import bounds, swept_up, thick_pieces
+from unitcad.kernels.mesh import bounds, swept_up, thick_pieces, widest
 from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
 
+PRESSED_PCT = 10.0
+"""Strain of silicone that is pressed aside, percent, at most (assumed): some N for each cm2, from a hand."""
 BLOCKED = 1e-5
 """Largest volume in the way, mm3: rounding of faces that slide along each other."""
 
@@ -53,6 +58,12 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
                 continue
             stays = there | laid | ({} if cast or silicone.is_empty() else {"layer": silicone})
             found = blocked(piece, stays, removal.direction)
+            if moulds.plan.way and "layer" in found:
+                depth, percent = _pressed_aside(piece, silicone, removal.direction)
+                said = f"{where}: the layer is pressed aside by {depth:.2g} mm"
+                advice = "the silicone is caught under the piece: part the mould elsewhere, or change the body there"
+                yield at_most("C300", said, percent, PRESSED_PCT, "%", advice)
+                del found["layer"]
             name = max(found, key=lambda name: found[name], default="")
             where += f" against {name}" if name else ""
             advice = f"part of the piece is under {name}: the two are drawn with an undercut"
@@ -106,6 +117,36 @@ def blocked(piece: Manifold, stays: Mapping[str, Manifold], direction: Way) -> d
     met = {name: space ^ solid for name, solid in over.items()}
     met = {name: float((solid - piece).volume()) for name, solid in met.items() if solid.volume() > BLOCKED}
     return {name: volume for name, volume in met.items() if volume > BLOCKED}
+
+
+def pressed_aside(moulds: MouldSet) -> list[tuple[str, float, float]]:
+    """Return the pieces of a parted mould that press silicone aside as they leave: name, depth in mm, percent."""
+    found = []
+    for step in moulds.plan.steps if moulds.plan.way else ():
+        silicone = united(moulds.meshes((*step.layer, *step.earlier)))
+        for removal in step.removals:
+            piece = moulds.pressed.get(removal.piece)
+            if piece is not None and blocked(piece, {"layer": silicone}, removal.direction):
+                found.append((removal.piece, *_pressed_aside(piece, silicone, removal.direction)))
+    return found
+
+
+def _pressed_aside(piece: Manifold, silicone: Manifold, direction: Way) -> tuple[float, float]:
+    """Return by how much silicone is pressed aside by a piece that leaves along `direction`: mm, and percent."""
+    turn = np.column_stack([upright(direction), np.zeros(3)])
+    piece, silicone = piece.transform(turn), silicone.transform(turn)
+    met = (swept_up(piece, max(bounds(solid)[5] for solid in (piece, silicone)) + 1) ^ silicone) - piece
+    depth, percent = 0.0, 0.0
+    for part in met.decompose():
+        if part.volume() <= BLOCKED / 100:
+            continue
+        shadow = part.project()
+        deep = widest(shadow)[0]
+        low, high = bounds(part)[2], bounds(part)[5]
+        there = [each for each in silicone.slice((low + high) / 2).decompose() if not (each ^ shadow).is_empty()]
+        wide = max((widest(each)[0] for each in there), default=deep)
+        depth, percent = max(depth, deep), max(percent, 200 * deep / wide)
+    return depth, percent
 
 
 @lru_cache(maxsize=256)

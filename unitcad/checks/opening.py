@@ -26,16 +26,19 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
 
 def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:
     step, where = cavity.step, cavity.where
-    opening = "sprue" if step.lid else "opening at the rim"
+    closed = step.injected
+    opening = "sprue" if closed else "opening at the rim"
     top = max(cavity.reached.bounding_box()[5], step.top - _SNAPPED)
     openings = regions(cavity.reached, top)
     width, area = openings[-1] if openings else (0.0, 0.0)
     advice = f"at z = {step.top:.4g} mm there is no room to pour: give the layer a flat top, or turn it over"
     yield at_least("C410", f"{where}: {opening}, area", area, LEAST_AREA, "mm2", advice)
     yield at_least("C410", f"{where}: {opening}, width", width, LEAST_WIDTH, "mm", advice)
-    if step.lid:
+    if closed:
         vent = openings[0][0] if len(openings) > 1 else 0.0
-        yield at_least("C410", f"{where}: narrowest vent", vent, LEAST_WIDTH, "mm", "a lid needs vents of that width")
+        yield at_least(
+            "C410", f"{where}: narrowest vent", vent, LEAST_WIDTH, "mm", "a closed mould needs vents of that width"
+        )
 
 
 CHECK = MouldCheck("C410", "opening: sprues, vents and open rims are wide enough for silicone and air", findings)

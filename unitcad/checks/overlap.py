@@ -2,19 +2,22 @@
 
 Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain. In
 bodies from a file films of facets are ignored: two facets reach into each other by their distances from the true
-surface. In a mesh file a pocket of coarse facets for a bought part passes with a note.
+surface. A wire may touch its slot's floor: the corners of its polygon and the grid of lengths are ignored likewise.
+In a mesh file a pocket of coarse facets for a bought part passes with a note.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
+from unitcad.checks.finding import GRID, MouldCheck, MouldFinding, at_most
+from unitcad.kernels.bounds import deviation
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -39,7 +42,9 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 def of_unit(moulds: MouldSet) -> list[MouldFinding]:
     """Look at the unit, or the patch, alone."""
     there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
-    found = _findings("unit", there, moulds.facets, {})
+    wires = [body for body in moulds.unit if body.kind == "wire"]
+    round_parts = {body.name: GRID + deviation(body.shape, moulds.segments) for body in wires}
+    found = _findings("unit", there, moulds.facets, {}, round_parts)
     return [finding if finding.ok else _explained(moulds, finding) for finding in found]
 
 
@@ -90,8 +95,17 @@ def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, .
         yield before.name if there == before.layer else f"{before.name} laid in", there
 
 
-def _findings(where: str, there: _There, facets: float, known: dict[tuple[str, str], float]) -> list[MouldFinding]:
-    """Return the pair that shares most, and every pair that shares too much; note each pair's volume, mm3."""
+def _findings(
+    where: str,
+    there: _There,
+    facets: float,
+    known: dict[tuple[str, str], float],
+    round_parts: Mapping[str, float] = MappingProxyType({}),
+) -> list[MouldFinding]:
+    """Return the pair that shares most, and every pair that shares too much; note each pair's volume, mm3.
+
+    `round_parts`: how far a round part in a flat passage may seem to be outside the passage, by its name, mm.
+    """
     pairs = []
     boxes = [np.array([solid.bounding_box() for solid in parts]) for _, parts in there]
     for ((a, parts), own), ((b, others), beside) in combinations(zip(there, boxes, strict=True), 2):
@@ -100,7 +114,8 @@ def _findings(where: str, there: _There, facets: float, known: dict[tuple[str, s
         if not len(meeting):
             continue
         if (a, b) not in known:
-            known[a, b] = sum(common_volume(parts[i], others[k], facets) for i, k in meeting)
+            films = facets + round_parts.get(a, 0.0) + round_parts.get(b, 0.0)
+            known[a, b] = sum(common_volume(parts[i], others[k], films) for i, k in meeting)
         pairs.append(at_most("C200", f"{where}: {a} and {b}", known[a, b], OVERLAP, "mm3"))
     return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
 

@@ -14,8 +14,9 @@ from unitcad.moulds.plan import Plan
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Look at every body of unit and tooling and the pieces of split tools; the genus if one is expected."""
     genus = expected_genus(moulds.plan)
+    several = {step.name: step.solids for step in moulds.plan.steps}
     for name, solid in moulds.solids.items():
-        yield from _whole(name, solid, moulds.pieces(name))
+        yield from _whole(name, solid, several.get(name, 1))
         if name in genus:
             yield _count(f"{name} genus", solid.genus(), genus[name])
     for split in moulds.plan.splits:

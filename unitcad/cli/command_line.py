@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from functools import partial
 from typing import Annotated, Any, cast
@@ -16,6 +15,7 @@ from typer.main import get_command
 from unitcad import __version__
 from unitcad.cli.output import form_of, say_error
 from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.hook_words import HOOK, options_ended
 from unitcad.rooms import commands, load
 from unitcad.text import measured
 
@@ -28,28 +28,12 @@ _PLAIN: dict[str, Any] = {
 }
 
 
-HOOK = "--hook"
-"""The option of commands that a hook runner calls."""
-
-
 class _Command(TyperCommand):
     """A command; with `--hook`, file names follow the options and may look like options themselves."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         valued = {name for one in self.params if not getattr(one, "is_flag", True) for name in one.opts}
         return super().parse_args(ctx, options_ended(args, valued) if HOOK in args else args)
-
-
-def options_ended(words: list[str], valued: Collection[str]) -> list[str]:
-    """Return a hook's words with "--" before the first file name.
-
-    A hook runner appends names to the options of its configuration. A word that begins with "-" is a name if there is
-    such a file. `valued`: the options whose next word is their value.
-    """
-    first = 0
-    while first < len(words) and words[first].startswith("-") and not os.path.isfile(words[first]):
-        first += 2 if words[first] in valued else 1
-    return words if "--" in words[:first] else [*words[:first], "--", *words[first:]]
 
 
 class _Commands(TyperGroup):

@@ -7,16 +7,13 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
-from rich.console import Console
-from rich.table import Column, Table
-from rich.text import Text
+import typer
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.text import printable
-from unitcad.workers import STAGES
 
 
 def print_json(data: Any) -> None:
@@ -86,42 +83,37 @@ def warn(line: str) -> None:
     sys.stderr.write(printable(line) + "\n")
 
 
-def console(stderr: bool = False) -> Console:
-    """Return a rich console. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji.
-
-    Only a terminal's width crops a table.
-    """
-    made = Console(markup=False, emoji=False, highlight=False, stderr=stderr)
-    if not made.is_terminal:
-        made.width = _NO_TERMINAL
-    return made
-
-
-def print_table(rows: Sequence[Mapping[str, str]], title: str = "") -> None:
-    """Print a row a line; the keys of a row are the heads of the columns."""
-    if rows:
-        table = Table(*(Column(head, no_wrap=i == 0) for i, head in enumerate(rows[0])), title=title or None)
-        for row in rows:
-            table.add_row(*row.values())
-        console().print(table)
-
-
 def print_indented(*lines: str) -> None:
     """Print each line below its head or its table."""
     for line in lines:
-        console().print(f"  {line}", soft_wrap=True)
+        typer.echo(f"  {printable(line)}")
 
 
-_NO_TERMINAL = 10_000
-"""Characters in a line of a file or pipe."""
+def print_head(name: str, rest: str) -> None:
+    """Print a name, bold on a terminal, and the rest of its line."""
+    typer.echo(f"{typer.style(printable(name), bold=True)}{printable(rest)}")
+
+
+def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
+    """Format a value with its range, or the one of the two that there is; a level next to nothing as below 0.01 %."""
+    if not quantity:
+        return "-"
+    scaled = [None if quantity.get(key) is None else factor * quantity[key] for key in ("value", "low", "high")]
+    value, low, high = (
+        one if one is None else "below 0.01" if factor == 100 and one < 0.01 else f"{one:.{digits}g}" for one in scaled
+    )
+    spread = f"{low} to {high}" if low and high and low != high else ""
+    if value:
+        return f"{value} ({spread})" if spread else value
+    return spread or "not known"
+
+
+STAGES = "UNITCAD_STAGES"
+"""Environment variable: the text with which a command begins a line on standard error for each stage of its work."""
 
 
 def stage_lines() -> Callable[[str], None] | None:
-    """Return the function that prints a stage as a line for the program that started this one; None where none reads.
-
-    The environment variable UNITCAD_STAGES holds the text that such a line begins with.
-    """
-
+    """Return the function that prints a stage as a line for the program that started this one; None if none reads."""
     mark = os.environ.get(STAGES)
     return (lambda stage: warn(f"{mark}{stage}")) if mark else None
 
@@ -133,7 +125,7 @@ def progress(name: str) -> Iterator[Callable[[str], None]]:
     if lines or not sys.stderr.isatty():
         yield lines or (lambda stage: None)
         return
+    from unitcad.cli.tables import spinner
 
-    # As Text: a spinner reads markup whatever its console's setting.
-    with console(stderr=True).status(Text(name)) as status:
-        yield lambda stage: status.update(Text(f"{name}: {stage}"))
+    with spinner(name) as say:
+        yield say

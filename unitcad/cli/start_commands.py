@@ -13,6 +13,7 @@ from msgspec import to_builtins
 from unitcad import catalogue
 from unitcad.casting.coupon import Coupon, write
 from unitcad.catalogue.filters import SHORT, keep
+from unitcad.catalogue.moduli import moduli_note
 from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.designs import shipped as designs
@@ -163,6 +164,8 @@ def list_(
             how = f"; {value['method']}" if "method" in value else ""
             bounds = _bounds(value)
             typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
+        if kind == "materials" and (note := moduli_note(catalogue.materials()[name])):
+            typer.echo(f"  moduli: {note}")
     for key, names in lacking.items():
         option = f"--{key.replace('_', '-')}" if key in SHORT else key
         typer.echo(f"left out, without a value for {option}: {some(names)}", err=True)

@@ -31,7 +31,6 @@ __all__ = [
     "estimated_designs",
     "inserts",
     "layer_colour",
-    "no_estimate",
     "shipped",
     "unit_bodies",
     "widths",
@@ -77,11 +76,6 @@ def dimensions(spec: Spec) -> Dimensions:
 def estimated_designs() -> dict[str, Design]:
     """Return the shipped designs that have an estimate by name."""
     return {name: design for name, design in shipped().items() if design.passes}
-
-
-def no_estimate() -> str:
-    """Write why a design that states no `passes` has no estimate."""
-    return f"the models describe {' and '.join(estimated_designs())} units only"
 
 
 def default_design() -> Design:

@@ -15,7 +15,6 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape, cut
 from unitcad.spec import Spec
-from unitcad.spec.body_file import bodies_in
 from unitcad.spec.custom_code import is_allowed, is_body_file, name_in_file
 from unitcad.text import some
 
@@ -77,6 +76,8 @@ def _run(name: str, source: str) -> Any:
 @lru_cache(maxsize=16)
 def _of_file(name: str, source: str) -> Mapping[str, Shape]:
     """Return the bodies of a file; space that layers share belongs to the earlier one."""
+
+    from unitcad.spec.body_file import bodies_in  # numpy and the mesh rules: most specs do without
 
     held = bodies_in(name, source)
     cast = [key for key in (f"layer{i + 1}" for i in range(len(held))) if key in held]

@@ -36,7 +36,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Layout:
-    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg."""
+    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg.
+
+    `ribs`: the spec's ribs centre the cups on the plinth; side pieces and trays have none.
+    """
 
     cells: tuple[Cell, ...]
     key: float
@@ -45,6 +48,7 @@ class Layout:
     cup: tuple[float, float]
     plate: tuple[float, float]
     label_height: float
+    ribs: bool = True
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,11 @@ class Tooling:
     channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () if all pours are open
     grooves      for each pour, whether its cup has an overflow groove; () if all have one
     concentric   whether the tools are those of rings: then the dimensions define every hole and gap in them
+    cast         the layers as they lie in the mould, in the frame of the tools; () as the unit is drawn
+    tops         for each pour, z of the silicone's open surface; () for rims and lids
+    gated        for each pour, whether its cup is closed and filled through a gate, the first of its channels; () for none
+    way          how the body is turned and where its mould comes apart, in words; "" as drawn, with cups that lift off
+    bench        the module that words and draws the casting of these tools; "" for cups that lift off
     """
 
     dimensions: Dimensions
@@ -68,6 +77,11 @@ class Tooling:
     channels: tuple[tuple[Shape, ...], ...] = ()
     grooves: tuple[bool, ...] = ()
     concentric: bool = False
+    cast: tuple[Shape, ...] = ()
+    tops: tuple[float, ...] = ()
+    gated: tuple[bool, ...] = ()
+    way: str = ""
+    bench: str = ""
 
     def __repr__(self) -> str:
         return f"Tooling({', '.join(tool.name for tool in self.tools)})"
@@ -117,7 +131,7 @@ class Design:
     opens        side on which motor and circuit go in: "above" or "below" (the skin)
     laid_in      the pour (from 1) before which motor, circuit and printed parts are laid in, to stay; 0: after casting
     caps         whether a layer has a cap over the one inside it, or is an open ring
-    passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
+    passes       how often the wave from motor to skin passes the border between the layers; None: no level at the edge
     assembly     how motor and circuit go into the body, or into the mould, a sentence each; [] for a default
     skipped     skipped pieces of this variant, and why
     default      whether it is the design of new specs; True for one design

@@ -17,10 +17,10 @@ from xml.etree import ElementTree
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from unitcad.errors import missing_extra
 from unitcad.export import svg
 from unitcad.export.chart import coord
 from unitcad.export.svg import Measure, Region, Side
+from unitcad.extras import missing_extra
 from unitcad.kernels.mesh import arrays
 
 MM = 72 / 25.4

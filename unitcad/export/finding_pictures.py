@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from unitcad import files
 from unitcad.export import raster
 from unitcad.export.raster import Colour, Name, Surface
-from unitcad.meshcheck.findings import SHOWN, FileReport, Finding, Location
+from unitcad.meshcheck.findings import FileReport, Finding, Location
+from unitcad.meshcheck.geometry.distance import nearest_of, refined
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, weld_exact
 from unitcad.meshcheck.rules.registry import rules
 
@@ -52,7 +53,7 @@ class Scene:
 
 
 def write(folder: Path, report: FileReport) -> FileReport:
-    """Write the pictures of a report into a folder of its own below `folder`; the report as it is without pictures.
+    """Write the pictures of a report into a folder of its own below `folder`; the report without its meshes.
 
     A file without findings, or without a mesh that can be drawn, has none. Raises OSError.
     """
@@ -62,8 +63,7 @@ def write(folder: Path, report: FileReport) -> FileReport:
         own.mkdir(parents=True, exist_ok=True)
         for finding in report.findings:
             files.write(own / f"{finding.code}.png", draw(report, finding, scenes))
-    findings = (replace(item, locations=item.locations[:SHOWN]) for item in report.findings)
-    return FileReport(report.path, tuple(findings), report.facts)
+    return replace(report, meshes=())
 
 
 def folder_name(path: str) -> str:
@@ -104,6 +104,38 @@ def draw(report: FileReport, finding: Finding, scenes: Sequence[Scene | None]) -
     for i, picture in enumerate(pictures):
         both.paste(Image.open(io.BytesIO(picture)), (i * SIZE[0], 0))
     return raster.encode_png(both)
+
+
+CHANGED = (0.86, 0.10, 0.12)
+_TOWARDS = ((1.0, -1.4, 0.9), (-1.2, 1.3, -0.9))
+_PIECES = 1 / 60  # side of the pieces that are coloured, as part of the diagonal
+
+
+def versions(folder: Path, path: str, old: np.ndarray, new: np.ndarray) -> None:
+    """Draw the old (left) and new version (right) of a file from two sides, triangles (n, 3, 3), mm.
+
+    Places away from the other version's surface are red. Raises OSError.
+    """
+    both = np.concatenate([old, new]).reshape(-1, 3)
+    size = float(np.linalg.norm(np.ptp(both, axis=0)))
+    sheet = Image.new("RGB", (2 * SIZE[0], 2 * SIZE[1]), "white")
+    for i, (mine, theirs) in enumerate(((old, new), (new, old))):
+        pieces = refined(mine, size * _PIECES)
+        away = nearest_of(theirs).distances(pieces.mean(axis=1)) > _AWAY * size
+        points, faces = weld_exact(pieces)
+        colours, behind = (np.where(away[:, None], CHANGED, paint) for paint in (PART, INSIDE))
+        surface = Surface(points, faces, colours, inside=behind)
+        for j, towards in enumerate(_TOWARDS):
+            view = raster.aim(towards, both, SIZE)
+            panel = Image.open(io.BytesIO(raster.finish([raster.render(surface, view)], view)))
+            ImageDraw.Draw(panel).text((12, 10), ("old", "new")[i], fill="black", font_size=20)
+            sheet.paste(panel, (i * SIZE[0], j * SIZE[1]))
+    folder.mkdir(parents=True, exist_ok=True)
+    files.write(folder / f"{folder_name(path)}.png", raster.encode_png(sheet))
+
+
+_AWAY = 1e-4
+"""Distance from which a place differs, as part of the diagonal."""
 
 
 def _region(place: Location) -> np.ndarray:

@@ -76,7 +76,7 @@ def content(parts: Sequence[GlbPart]) -> bytes:
         try:
             vertices, normals, faces = _ready(*mesh)
         except TooThin as error:
-            raise TooThin(f"{part.name}: {error}") from None
+            raise TooThin(f"{part.name}: {error.fault}", error.at) from None
         wide = len(vertices) > 65535
         corners = faces.ravel().astype("<u4" if wide else "<u2")
         primitive = {

@@ -25,7 +25,12 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 
 
 class TooThin(UnitcadError):
-    """A mesh that single precision can't represent."""
+    """A mesh that single precision can't represent: `fault`, and the point `at` (mm) in the frame of the mesh."""
+
+    def __init__(self, fault: str, at: np.ndarray) -> None:
+        self.fault, self.at = fault, at
+        x, y, z = (round(float(value), 3) + 0.0 for value in at)
+        super().__init__(f"{fault}, at x = {x:g}, y = {y:g}, z = {z:g} mm")
 
 
 def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -35,7 +40,12 @@ def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = Fal
     sorted), every face thicker than single precision resolves at this size. Raises TooThin if that is not
     possible.
     """
-    return single_precision(lay_down(vertices, upside_down), faces)
+    laid = lay_down(vertices, upside_down)
+    try:
+        return single_precision(laid, faces)
+    except TooThin as error:
+        nearest = int(np.linalg.norm(laid - error.at, axis=1).argmin())
+        raise TooThin(error.fault, vertices[nearest]) from None
 
 
 def lay_down(vertices: np.ndarray, upside_down: bool) -> np.ndarray:
@@ -58,9 +68,7 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
     one.
     """
     solid = manifold3d.Manifold(
-        manifold3d.Mesh64(
-            np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64)
-        )
+        manifold3d.Mesh64(np.array(vertices, np.float64, order="C"), np.array(faces, np.uint64, order="C"))
     )
     step = resolution(vertices)
     for power in range(1, ROUNDS + 1):
@@ -68,8 +76,12 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
         rounded = _to_float32(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64))
         if len(rounded[1]) and _is_closed(rounded[1]) and _thinnest(*rounded) > step:
             return rounded
-    where = f"parts of it touch along an edge only, or two faces are nearer than {step:.2g} mm"
-    raise TooThin(f"the mesh can't be rounded to single precision: {where}")
+    found, faces = rounded
+    why = "the mesh can't be rounded to single precision: "
+    if len(faces) and not _is_closed(faces):
+        raise TooThin(f"{why}parts of it touch along an edge only", _open_edge(found, faces))
+    place = found[faces[_altitudes(found, faces).argmin(), 0]] if len(faces) else vertices[0]
+    raise TooThin(f"{why}two faces are nearer than {step:.2g} mm", place)
 
 
 def _to_float32(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -92,12 +104,24 @@ def _is_closed(faces: np.ndarray) -> bool:
     return bool(np.all(np.diff(forward) > 0) and np.array_equal(forward, np.sort(end * count + start)))
 
 
+def _open_edge(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the first corner of an edge that is not used once in each direction."""
+    edges = np.stack([faces.ravel(), np.roll(faces, -1, axis=1).ravel()], axis=1)
+    used, times = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0, return_counts=True)
+    return vertices[used[times != 2][0, 0]]
+
+
 def _thinnest(vertices: np.ndarray, faces: np.ndarray) -> float:
     """Return the least altitude of any face (mm)."""
+    return float(_altitudes(vertices, faces).min())
+
+
+def _altitudes(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the least altitude of each face (mm)."""
     corners = vertices.astype(np.float64)[faces]
     edges = corners[:, (1, 2, 0)] - corners
     doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    return float(np.min(doubled_area / np.linalg.norm(edges, axis=2).max(axis=1)))
+    return doubled_area / np.linalg.norm(edges, axis=2).max(axis=1)
 
 
 def stl(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:

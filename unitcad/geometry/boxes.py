@@ -157,12 +157,13 @@ def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
     return Slabs(low, high)
 
 
-def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
+def meeting_pairs(boxes: Ints, tick: Tick = lambda: None, alike: Ints | None = None) -> Iterator[tuple[Ints, Ints]]:
     """Yield blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
 
-    Rows near each other should be near in space.
+    Rows near each other should be near in space. Most pairs of rows with one number in `alike` (n,) are left out; -1 is
+    for rows that are like no other.
     """
-    tree = _tree(boxes, 0)
+    tree = _tree(boxes, 0, alike)
     yield from _descend(tree, tree, len(tree.rows), *np.triu_indices(tree.roots), tick, own=True)
 
 
@@ -202,20 +203,29 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class _Tree:
-    """The nodes of each level but the uppermost, which has `roots`, four to a row (`_packed`), leaves first."""
+    """The nodes of each level but the uppermost, which has `roots`, four to a row (`_packed`), leaves first.
+
+    `alike` has for each row the number that all below it have in common, -1 for none; empty if none have any.
+    """
 
     rows: list[Ints]
     roots: int
+    alike: list[Ints]
 
 
-def _tree(boxes: Ints, least: int) -> _Tree:
+def _tree(boxes: Ints, least: int, alike: Ints | None = None) -> _Tree:
     """Return the tree over boxes, for `least` leaves or more."""
     level, rows = _padded(boxes, max(least - len(boxes), 0)), list[Ints]()
+    numbers = list[Ints]()
     while not rows or len(level) > _ROOTS:
         rows.append(_packed(level))
+        if alike is not None:
+            four = np.concatenate([alike, np.full(len(level) - len(alike), -1)]).reshape(-1, _FAN)
+            alike = np.where((four == four[:, :1]).all(axis=1), four[:, 0], -1)
+            numbers.append(alike)
         pair = np.minimum(level[0::2], level[1::2])
         level = _padded(np.minimum(pair[0::2], pair[1::2]), 0)
-    return _Tree(rows, len(level))
+    return _Tree(rows, len(level), numbers)
 
 
 def _padded(boxes: Ints, more: int) -> Ints:
@@ -259,6 +269,10 @@ def _below(
     rows, others = here.rows[level - 1], there.rows[level - 1]
     keep = first < len(rows)
     keep &= second < len(others)
+    if own and here.alike:
+        number = here.alike[level - 1]
+        one, other = number.take(first, mode="clip"), number.take(second, mode="clip")
+        keep &= (one != other) | (one < 0)
     skip = None if not own else gt if level > 1 else ge
     return _walk(rows, others, first[keep], second[keep], skip, tick)
 

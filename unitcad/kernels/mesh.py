@@ -9,7 +9,7 @@ from typing import Any
 
 import manifold3d
 import numpy as np
-from manifold3d import CrossSection, JoinType, Manifold
+from manifold3d import CrossSection, FillRule, JoinType, Manifold
 
 from unitcad.errors import UnitcadError
 from unitcad.geometry.components import components
@@ -177,6 +177,10 @@ _SAME_LINE = 1e-9
 
 _CRACK = 0.01
 """Area up to which a crack between two prisms is left, mm2."""
+_OVER = 1e-8
+"""Share of a patch's area in plan that may lie over itself: rounding of the section's grid."""
+_STEEP = 0.1
+"""Slope against the vertical of faces that are a patch of their own in one that lies over itself: leaning walls."""
 _UPRIGHT = 1e-6
 """Slope against the vertical up to which a face counts as upright, since rounding tilts it."""
 
@@ -197,6 +201,7 @@ def _below(solid: Manifold, bottom: float) -> Manifold:
     vertices = _plumb(vertices)
     faces = _upward(vertices, faces)
     patches, corners = _patches(faces), vertices[np.unique(faces), :2]
+    patches = [part for patch in patches for part in _not_over_itself(vertices, patch)]
     plain = [_prism(vertices, patch, bottom) for patch in patches]
     split = [_prism(*_split_at_lines(vertices, patch, corners), bottom) for patch in patches]
     # Only a crack makes so much surface: without one, the fewer triangles are used. The measured solid is not returned,
@@ -209,7 +214,8 @@ def swept_up(solid: Manifold, top: float) -> Manifold:
     """Return the volume over the upward faces of `solid`, up to z = `top`, which is above it."""
     vertices, faces = arrays(solid)
     turned = vertices * (1.0, 1.0, -1.0)
-    prisms = (_prism(turned, patch, -top) for patch in _patches(_upward(vertices, faces)))
+    patches = (part for patch in _patches(_upward(vertices, faces)) for part in _not_over_itself(turned, patch))
+    prisms = (_prism(turned, patch, -top) for patch in patches)
     return _joined([prism.mirror((0, 0, 1)) for prism in prisms])
 
 
@@ -246,6 +252,42 @@ def _patches(faces: np.ndarray) -> list[np.ndarray]:
     first, second = of_face[order][:-1][same], of_face[order][1:][same]
     labels = components(len(faces), first, second)
     return [faces[labels == i] for i in range(int(labels.max(initial=-1)) + 1)]
+
+
+def _not_over_itself(vertices: np.ndarray, patch: np.ndarray) -> list[np.ndarray]:
+    """Return a patch in parts of which none lies over itself, as several turns of a thread do: its prism would be none.
+
+    Steep walls are parted from the rest, then halves by the number of faces from one end, until each part's shadow has
+    the area of its faces.
+    """
+    plan = vertices[patch][:, :, :2]
+    (x0, y0), (x1, y1) = (plan[:, 1] - plan[:, 0]).T, (plan[:, 2] - plan[:, 0]).T
+    area = np.abs(x0 * y1 - y0 * x1).sum() / 2
+    shadow = CrossSection(list(plan), FillRule.NonZero).area()
+    if len(patch) < 2 or area - shadow <= _OVER * area:
+        return [patch]
+    normals = np.cross(vertices[patch[:, 1]] - vertices[patch[:, 0]], vertices[patch[:, 2]] - vertices[patch[:, 0]])
+    steep = normals[:, 2] < _STEEP * np.linalg.norm(normals, axis=1)
+    if steep.all() or not steep.any():
+        steep = _from_one_end(patch) < len(patch) // 2
+    halves = steep, ~steep
+    return [part for half in halves for joined in _patches(patch[half]) for part in _not_over_itself(vertices, joined)]
+
+
+def _from_one_end(patch: np.ndarray) -> np.ndarray:
+    """Return the order of a patch's faces, counted over their edges from a face at one end."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    edges = np.sort(patch[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    same = np.all(edges[order][1:] == edges[order][:-1], axis=1)
+    first, second = (order[side][same] // 3 for side in (slice(None, -1), slice(1, None)))
+    graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(patch),) * 2).tocsr()
+    far = breadth_first_order(graph, 0, directed=False, return_predecessors=False)[-1]
+    rank = np.empty(len(patch), np.int64)
+    rank[breadth_first_order(graph, far, directed=False, return_predecessors=False)] = np.arange(len(patch))
+    return rank
 
 
 def _split_at_lines(vertices: np.ndarray, patch: np.ndarray, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Any
 
-from unitcad.errors import UnitcadError, pip_install
+from unitcad.errors import UnitcadError
+from unitcad.extras import pip_install
 from unitcad.kernels import occt
 from unitcad.kernels.ocp import loading
 from unitcad.shape.tree import Body

@@ -12,7 +12,8 @@ import importlib.metadata
 import shlex
 from collections.abc import Iterator
 
-from unitcad.errors import Missing, install_command, pip_install
+from unitcad.errors import Missing
+from unitcad.extras import install_command, pip_install
 
 WHEEL_VERSION = "7.9.3.1.1"
 WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")

@@ -1,8 +1,9 @@
-"""unitcad fit: lab-fit.toml, fit.json and fit.svg. The same input, the same bytes."""
+"""unitcad fit: lab-fit.toml, fit.json and fit.svg, and the check of a contribution. The same input, the same bytes."""
 
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,13 +13,19 @@ import typer
 from rich.table import Column, Table
 
 from unitcad import files
-from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE, sign_flip_p
+from unitcad.attenuation.edge.models import BASELINE, RULE
 from unitcad.attenuation.edge.ranges import PERCENT, ModelFit, quantiles
-from unitcad.cli.output import console, print_json, progress
+from unitcad.attenuation.edge.scoring import OVERTURNED, sign_flip_p
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
+from unitcad.cli.tables import console
+from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
-from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
+from unitcad.json_text import rounded
+from unitcad.lab import contribution
+from unitcad.lab.contribution import lacks
+from unitcad.lab.fitting import FitLab, Fitted, fit_lab, load_fit_lab
+from unitcad.lab.random_effects import Effect
 from unitcad.spec.convert import without_none
 from unitcad.spec.toml import text_of
 
@@ -26,6 +33,10 @@ FIT = "lab-fit.toml"
 DIFFERING = (
     "Level by each model, fitted without the unit, and the factor between the highest and the lowest. "
     "A second cast of these units decides most."
+)
+EFFECTS = (
+    "Factors on the level by the model that leads: of a lab over this lab's, of a batch over the mean batch's, and the "
+    "scatter between labs, batches and units, one standard deviation."
 )
 _MOST_DIFFERING = 5
 
@@ -51,6 +62,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
         "units": unit_rows(result),
         "models_differ_on": differing_units(result),
         "fit": without_none(msgspec.to_builtins(result.fit)),
+        "effects": effect_rows(result),
         "prior": prior_text(result),
         "warnings": warnings(result),
     }
@@ -62,9 +74,17 @@ def unit_rows(result: Fitted) -> list[dict[str, Any]]:
     judged = result.judged[name]
     rows = []
     for i, unit in enumerate(table.names):
-        low, high = map(float, quantiles(judged.df, judged.centre[i], judged.scale[i]))
+        low, high = map(float, quantiles(int(judged.df[i]), judged.centre[i], judged.scale[i]))
         numbers = {"predicted": float(np.exp(judged.centre[i])), "p10": low, "p90": high}
-        row = {"unit": unit, "own": bool(judged.own[i]), "measured": float(table.levels[i]), "model": name, **numbers}
+        lab = result.lab.labs[result.campaigns.lab[i]]
+        row = {
+            "unit": unit,
+            "lab": lab,
+            "own": bool(judged.own[i]),
+            "measured": float(table.levels[i]),
+            "model": name,
+            **numbers,
+        }
         rows.append(rounded(row, 6))
     return rows
 
@@ -77,7 +97,8 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
     judged = {name: one for name, one in result.judged.items() if name != BASELINE}
     own = next(iter(judged.values())).own
     rows = []
-    for i, unit in zip(np.flatnonzero(own), result.lab.units, strict=True):
+    measured = [unit for unit in result.lab.units if unit.lab is None]
+    for i, unit in zip(np.flatnonzero(own), measured, strict=True):
         levels = {name: float(np.exp(one.centre[i])) for name, one in judged.items()}
         factor = max(levels.values()) / min(levels.values())
         rows.append(rounded({"unit": unit.name, "levels": levels, "factor": factor, "measured": unit.level.value}, 6))
@@ -85,16 +106,35 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
 
 
 def prior_text(result: Fitted) -> str:
-    """State the weight of the stored constants."""
+    """State how the units of several labs count."""
     settings = result.lab.settings
-    count = int(np.sum(~result.campaigns.own))
-    if not count:
-        return "Only the lab's own units count: nothing is shrunk."
-    weight = count / (count * settings.between_labs**2 + 1)
+    if len(set(result.campaigns.lab)) < 2:
+        return "Only the lab's own units count."
     return (
-        f"The stored constants, of {count} units, weigh as much as {weight:.2g} of the lab's own "
-        f"(between_labs {settings.between_labs:g}: assumed, not measured)."
+        f"Labs share the model's constants; each lab's factor on the level is fitted. Expected before the levels are "
+        f"read: labs scatter by {settings.between_labs:g} times the scatter of units, batches by "
+        f"{settings.between_batches:g} times (between_labs and between_batches: assumed)."
     )
+
+
+def effect_rows(result: Fitted) -> list[dict[str, Any]]:
+    """Return the factors of labs and batches on the level by the model that leads, with 90 % ranges, and the scatter.
+
+    A lab's is over this lab's, a batch's over the mean batch's. A scatter is a factor too: exp of a standard deviation.
+    """
+    found, labs, batches = result.leading, result.lab.labs, result.lab.batches
+    rows = [("lab", labs[number], one) for number, one in found.labs.items()]
+    for number, one in found.batches.items():
+        lab, name = batches[number]
+        rows.append(("batch", f"{lab}, {name}" if lab else name, one))
+    rows += [
+        ("scatter", f"between {kind}", Effect(*(float(np.exp(getattr(one, end))) for end in ("value", "low", "high"))))
+        for kind, one in found.scatter.items()
+    ]
+    return [
+        rounded({"kind": kind, "name": name, "factor": one.value, "low": one.low, "high": one.high}, 4)
+        for kind, name, one in rows
+    ]
 
 
 def constants_text(one: ModelFit) -> str:
@@ -122,6 +162,8 @@ def leads_text(result: Fitted) -> str:
     judged = result.judged
     errors = {name: np.abs(one.errors[one.own]) for name, one in judged.items()}
     lead = result.fit.leads
+    if not result.fit.units:
+        return f"{lead} leads, as without units of the lab's own: its level is that of a lab that nobody measured."
     tests = [
         f"{other} x {judged[other].own_score:.2f}, p {sign_flip_p(errors[lead], errors[other]):.2g}"
         for other in (RULE, BASELINE)
@@ -156,14 +198,19 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
             error, p = one.against_baseline_error, one.against_baseline_p
             against = f"{one.against_baseline:+.2f} +- {error:.2f}, p {p:.2g}"
         models.append([name, score, *own, against, one.coverage])
-    units = [["unit", "measured", "predicted", "P10", "P90"]]
+    units = [["unit", "lab", "measured", "predicted", "P10", "P90"]]
     for row in unit_rows(result):
         numbers = (f"{row[key]:.3g}" for key in ("measured", "predicted", "p10", "p90"))
-        units.append([f"{row['unit']}{' (own)' if row['own'] else ''}", *numbers])
+        units.append([row["unit"], "own" if row["own"] else row["lab"], *numbers])
+    effects = [["factor", "value", "90 %"]]
+    for row in effect_rows(result):
+        name = row["name"] if row["kind"] == "scatter" else f"{row['kind']} {row['name']}"
+        effects.append([name, f"x {row['factor']:.2f}", f"{row['low']:.2f} to {row['high']:.2f}"])
     rows = differing_units(result)[:_MOST_DIFFERING]
-    differing = [["unit", *rows[0]["levels"], "factor"]]
+    differing = [["unit", *(name for name in result.judged if name != BASELINE), "factor"]]
     for row in rows:
         differing.append([row["unit"], *(f"{level:.2g}" for level in row["levels"].values()), f"x {row['factor']:.2f}"])
+    last = [("Units on which the models differ most", differing, [DIFFERING])] if rows else []
     constants = [f"{name}: {constants_text(result.fit.model[name])}." for name in names]
     return [
         (
@@ -182,14 +229,15 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
             ],
         ),
         ("Units", units, [f"Predicted without the unit by {result.fit.leads}; 80 % intervals."]),
-        ("Units on which the models differ most", differing, [DIFFERING]),
+        ("Labs and batches", effects, [EFFECTS]),
+        *last,
     ]
 
 
 def _chart(result: Fitted) -> str:
     rows = unit_rows(result)
     series = []
-    for label, own in (("the paper's units", False), ("the lab's own", True)):
+    for label, own in (("units of other labs", False), ("the lab's own", True)):
         there = [row for row in rows if row["own"] == own]
         if there:
             measured, predicted = ([row[key] for row in there] for key in ("measured", "predicted"))
@@ -214,17 +262,29 @@ def fit(
             help="Folder for lab-fit.toml, fit.json and fit.svg. Default: only print.",
         ),
     ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Only check the file as a contribution: what it lacks for others to use its units."
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Judge the edge-level models with a lab's units, and fit them.
 
-    Every model predicts each unit from all others, and so does the baseline, the means of four classes. The fewer
-    units, the more the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
+    Every model predicts each unit from all others, and so does the baseline, the means of four classes. Labs share a
+    model's constants, and each has a factor on the level. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
 
-    loaded = load_fit_lab(lab)
+    if check:
+        if out is not None:
+            raise Refusal("--check", str(out), "writes nothing: leave out --out")
+        with progress("check"):
+            loaded = load_fit_lab(lab)
+        _print_check(loaded, as_json)
+        return
     with progress("fit") as stage:
-        result = fit_lab(loaded, stage)
+        result = fit_lab(load_fit_lab(lab), stage)
         made = contents(result) if out is not None else {}
     if out is not None:
         files.replace_all(out, {name: text.encode() for name, text in made.items()}, FIT)
@@ -234,6 +294,33 @@ def fit(
     _print(result)
     if out is not None:
         typer.echo(str(out))
+
+
+def _print_check(loaded: FitLab, as_json: bool) -> None:
+    """Print each unit and everything that the file lacks as a contribution; exit 1 if it lacks anything."""
+    found, rows = lacks(loaded), contribution.unit_rows(loaded)
+    if as_json:
+        data = [{"where": one.where, "message": one.message} for one in found]
+        print_json({"name": loaded.settings.name, "complete": not found, "units": rows, "lacks": data})
+    else:
+        for row in rows:
+            ends = "" if row["low"] is None else f" ({row['low']:.3g} to {row['high']:.3g})"
+            level = f"{row['level']:.3g}{ends} of the motor's amplitude at {row['frequency_hz']:.1f} Hz"
+            typer.echo(f"{row['unit']}: {level}; {row['source']}{_expected(row)}")
+        for one in found:
+            warn(f"{one.where}: {one.message}")
+        count = f"{len(rows)} unit{'s' if len(rows) > 1 else ''}"
+        typer.echo(f"{count}: nothing is missing" if not found else f"{count}; {len(found)} to settle")
+    if found:
+        sys.exit(1)
+
+
+def _expected(row: dict[str, Any]) -> str:
+    """Return the rule's range for a unit, and whether its level is far off."""
+    if row["expected_low"] is None:
+        return ""
+    far = ", far from this level: check the motor's amplitude and the units" if row["far"] else ""
+    return f"; the rule expects {row['expected_low']:.3g} to {row['expected_high']:.3g}{far}"
 
 
 def _print(result: Fitted) -> None:

@@ -17,6 +17,7 @@ from unitcad import files
 from unitcad.catalogue import Material
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.lab.readers import AS_FOUND, Layout, Recording, open_recording
+from unitcad.lab.toe import Toe, fit_toe
 from unitcad.lab.units import COLUMN_UNITS, plain
 from unitcad.text import some
 
@@ -162,7 +163,8 @@ class TensileCurve:
     """One specimen's curve up to its largest stress: engineering strain rises, engineering stress in Pa; both (n,).
 
     `rate`: strain per second at the start, None without a time. `skipped`: points whose strain had been passed before;
-    `lost`: rows without a number. `sha256`: of the file.
+    `lost`: rows without a number. `cycles`: how often the strain goes back and rises again, in all of the file.
+    `sha256`: of the file.
     """
 
     name: str
@@ -173,6 +175,7 @@ class TensileCurve:
     rate: float | None = None
     skipped: int = 0
     lost: int = 0
+    cycles: int = 0
 
 
 def read_curve(
@@ -196,6 +199,7 @@ def read_curve(
         if specimen.area is None:
             raise Refusal("--width-mm", None, f"{path.name} gives only the force: width and thickness are required")
         stress = data["force"] / specimen.area
+    cycles = _cycles(strain)
     # Up to the largest stress, without points whose strain had been passed before.
     if len(stress) == 0:
         raise UnitcadError(f"{path}: no row has a number in each of the columns that are read")
@@ -212,7 +216,23 @@ def read_curve(
         raise UnitcadError(f"{path}: {len(strain)} points before the largest stress; a curve needs {LEAST_POINTS}")
     if strain[0] <= -1.0:
         raise UnitcadError(f"{path}: the strain begins at {strain[0]:.3g}: strain cannot be below -1")
-    return TensileCurve(path.name, strain, stress, specimen, files.sha256(path), rate, int((~fresh).sum()), lost)
+    return TensileCurve(
+        path.name, strain, stress, specimen, files.sha256(path), rate, int((~fresh).sum()), lost, cycles
+    )
+
+
+def _cycles(strain: np.ndarray) -> int:
+    """Return how often the strain goes back by a part of its whole, and then rises by as much."""
+    if len(strain) < 2:
+        return 0
+    least = MOST_BACK * float(np.ptp(strain))
+    count, extreme, rising = 0, float(strain[0]), True
+    for value in map(float, strain):
+        if (value > extreme) == rising:
+            extreme = value
+        elif abs(value - extreme) > least:
+            count, extreme, rising = count + (not rising), value, not rising
+    return count
 
 
 def header_of(path: Path) -> Specimen:
@@ -259,63 +279,8 @@ SECANTS = (0.10, 0.15, 0.25, 0.50, 1.00)
 SLOPE_TO = 0.25
 WIDEST_GAP = 0.5
 """Between two points of a curve, as a part of the strain of use, or of a secant's strain: nothing is made up beyond."""
-_GRID = 41
-_PASSES = 3
-
-
 Modulus = tuple[str, float | None, str]
 """A method, its Young's modulus of one curve in Pa, and the reason if the method can't be used: the modulus is None."""
-
-
-def _neo_hooke(stretch: np.ndarray) -> np.ndarray:
-    """Return the nominal stress over Young's modulus at stretches."""
-    return (stretch - stretch**-2) / 3.0
-
-
-@dataclass(frozen=True)
-class Toe:
-    """The start of a curve: neo-Hooke's law with a shifted origin, fitted from the first point to a strain.
-
-    `origin`: the strain at which the law's stress is zero (slack positive, an offset of the force either way).
-    `youngs_modulus`: the law's, Pa.
-    """
-
-    origin: float
-    youngs_modulus: float
-
-    def stress(self, strain: np.ndarray) -> np.ndarray:
-        """Return the fitted nominal stress (Pa) at engineering strains as recorded."""
-        return self.youngs_modulus * _neo_hooke(1.0 + strain - self.origin)
-
-    def secant(self, low: float, high: float) -> float:
-        """Return the mean secant modulus (Pa) between two strains, from the fitted origin."""
-        stretch = 1.0 + np.linspace(low, high, _GRID)
-        return float(np.mean(self.youngs_modulus * _neo_hooke(stretch) / (stretch - 1.0)))
-
-
-def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None:
-    """Fit the start of a curve by least squares, up to the strain `high` counted from the fitted origin.
-
-    None with fewer than three points, or no solution.
-    """
-
-    toe, up_to = None, high
-    for _ in range(1 + _PASSES):
-        x, y = strain[strain <= up_to], stress[strain <= up_to]
-        if len(x) < 3 or np.ptp(x) < 0.25 * up_to:
-            return toe
-        slope, offset = np.polyfit(x, y, 1)
-        if slope <= 0.0:
-            return toe
-
-        def misfit(p: np.ndarray, x: np.ndarray = x, y: np.ndarray = y / slope) -> np.ndarray:
-            return p[0] * _neo_hooke(1.0 + x - p[1]) - y
-
-        start, bounds = [1.0, -offset / slope], ([1e-6, -0.5], [1e3, float(x.max())])
-        found = least_squares(misfit, start, bounds=bounds, xtol=1e-14, ftol=1e-14)
-        toe = Toe(float(found.x[1]), float(found.x[0] * slope))
-        up_to = high + max(toe.origin, 0.0)
-    return toe
 
 
 def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
@@ -329,22 +294,27 @@ def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
 
 
 def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float, toe: Toe | None) -> list[Modulus]:
-    """Return Young's modulus by every method, the default first; strain rises, stress in Pa, use is `low` to `high`."""
-    value, reason = None, ""
-    if strain[-1] < high:
-        reason = f"the curve ends at {100 * strain[-1]:.3g} %"
+    """Return Young's modulus by every method, the default first; strain rises, stress in Pa, use is `low` to `high`.
+
+    Strains count from the toe's origin, stresses from its offset.
+    """
+    value, reason, origin = None, "", toe.origin if toe else 0.0
+    if toe:
+        strain, stress = strain - toe.origin, stress - toe.offset
+        strain, stress = strain[strain > 0], stress[strain > 0]
+    if len(strain) == 0 or strain[-1] < high:
+        reason = f"the curve ends at {100 * strain[-1] if len(strain) else 0:.3g} %"
     elif toe is None:
         reason = f"too few points below {100 * high:.3g} %, or no rising stress there"
     else:
-        points = strain - toe.origin
-        points = np.concatenate([[low], points[(points > low) & (points < high)], [high]])
+        points = np.concatenate([[low], strain[(strain > low) & (strain < high)], [high]])
         gap = int(np.argmax(np.diff(points)))
         begin, end = points[gap : gap + 2]
         if end - begin > WIDEST_GAP * (high - low):
-            span = f"{100 * (begin + toe.origin):.3g} and {100 * (end + toe.origin):.3g} %"
+            span = f"{100 * (begin + origin):.3g} and {100 * (end + origin):.3g} %"
             reason = f"the curve has no point between {span} strain"
         else:
-            value = toe.secant(low, high)
+            value = toe.secant
     found: list[Modulus] = [(f"secant over {100 * low:.3g} to {100 * high:.3g} %, toe fitted", value, reason)]
     for at in SECANTS:
         value, reason = secant(strain, stress, at), ""
@@ -365,8 +335,10 @@ AREA_ERROR = 0.02
 """Relative error of a cross-section of which no lengths are known (assumed)."""
 MOST_SCATTER, OTHER_MATERIAL, MOST_OF_SHEET = 1.25, 3.0, 5.0
 """Largest over least specimen that is warned of, and that is no longer one silicone; modulus over the sheet's."""
-LATEST_START, MOST_TOE = 0.02, 0.02
-"""Limits: strain of the first point, strain of the toe."""
+LATEST_START, MOST_TOE, MOST_OFFSET, MOST_TOE_ERROR = 0.02, 0.02, 0.05, 0.1
+"""Limits: strain of the first point, strain of the toe, offset over the stress in use, error by the toe."""
+MOST_BACK = 0.05
+"""Part of the whole strain by which it goes back, and rises again, in a cycle."""
 
 
 @dataclass(frozen=True)
@@ -384,7 +356,8 @@ class MethodRow:
 class TensileResult:
     """The modulus (Pa) at the strain of use, its range, every method, and the parts of the uncertainty.
 
-    `scatter`, `geometry`: half-widths of the logarithm; scatter is None for one specimen. `spread`: the largest over
+    `scatter`, `geometry`, `start`: half-widths of the logarithm; scatter is None for one specimen, and `start` is that
+    of the fitted toe. `spread`: the largest over
     the least defensible value. `rate`: strain per second, None if not known. `warnings`: each begins with its name.
     """
 
@@ -397,6 +370,7 @@ class TensileResult:
     curves: tuple[TensileCurve, ...]
     scatter: float | None
     geometry: float
+    start: float
     spread: float
     used: tuple[float, float]
     rate: float | None
@@ -414,12 +388,15 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
         if before := known.get(curve.sha256):
             raise Refusal("FILES", curve.name, f"has the same content as {before.name}: one specimen counts once")
         known[curve.sha256] = curve
-    toes = tuple(fit_start(curve.strain, curve.stress, used[1]) for curve in curves)
+    toes = tuple(fit_toe(curve.strain, curve.stress, *used) for curve in curves)
     by_curve = (moduli(curve.strain, curve.stress, *used, toe) for curve, toe in zip(curves, toes, strict=True))
     rows = tuple(_row(methods) for methods in zip(*by_curve, strict=True))
     chosen = rows[0]
     if chosen.value is None:
-        reach = math.floor(1000 * min(float(curve.strain[-1]) for curve in curves)) / 10
+        ends = (
+            curve.strain[-1] - max(toe.origin if toe else 0.0, 0.0) for curve, toe in zip(curves, toes, strict=True)
+        )
+        reach = math.floor(1000 * float(min(ends))) / 10
         nearest = f"{100 * used[0]:g}:{reach:g}" if 100 * used[0] < reach < 100 * used[1] else None
         raise Refusal("--strain", f"{100 * used[0]:g}:{100 * used[1]:g}", chosen.reason, nearest)
     by_specimen = [one for one in chosen.by_specimen if one is not None]
@@ -434,10 +411,11 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
         count = len(by_specimen)
         scatter = float(t.ppf(0.975, count - 1) * np.std(np.log(by_specimen), ddof=1) / math.sqrt(count))
     geometry = max(curve.specimen.area_error for curve in curves)
-    widened = math.exp(math.hypot(scatter or 0.0, geometry))
+    start = math.sqrt(sum(toe.error**2 for toe in toes if toe) / len(toes))
+    widened = math.exp(math.hypot(scatter or 0.0, geometry, start))
     rates = [curve.rate for curve in curves if curve.rate]
     values = [row.value for row in rows if row.value is not None and row.defensible]
-    warnings = [doubt for curve, toe in zip(curves, toes, strict=True) for doubt in _doubts(curve, toe)]
+    warnings = [doubt for curve, toe in zip(curves, toes, strict=True) for doubt in _doubts(curve, toe, used)]
     if len(curves) == 1:
         warnings.append("specimens: one curve: the scatter of specimens is not in the range")
     if ratio > MOST_SCATTER:
@@ -449,7 +427,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
             warnings.append(f"sheet: {off:.3g} times {of}: check the units and --like")
     return TensileResult(
         chosen.value, min(values) / widened, max(values) * widened, chosen.method, rows, toes, tuple(curves),
-        scatter, geometry, max(values) / min(values), used, float(np.median(rates)) if rates else None, tuple(warnings),
+        scatter, geometry, start, max(values) / min(values), used, float(np.median(rates)) if rates else None, tuple(warnings),
     )  # fmt: skip
 
 
@@ -476,18 +454,27 @@ def _row(methods: Sequence[Modulus]) -> MethodRow:
     return MethodRow(methods[0][0], mean, values, defensible, "; ".join(reasons[:2]))
 
 
-def _doubts(curve: TensileCurve, toe: Toe | None) -> Iterator[str]:
+def _doubts(curve: TensileCurve, toe: Toe | None, used: tuple[float, float]) -> Iterator[str]:
     """Yield the warnings about one curve."""
     name = curve.name
     if curve.strain[0] > LATEST_START:
         yield f"start: {name}: the first point is at {100 * curve.strain[0]:.3g} % strain"
-    if toe and abs(toe.origin) > MOST_TOE:
-        yield f"toe: {name}: the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
+    if toe:
+        found = []
+        if abs(toe.origin) > MOST_TOE:
+            found.append(f"{'slack' if toe.origin > 0 else 'pretension'} of {100 * abs(toe.origin):.3g} % strain")
+        if abs(toe.offset) > MOST_OFFSET * toe.secant * sum(used) / 2:
+            force = f" ({1e3 * toe.offset * curve.specimen.area:.3g} mN)" if curve.specimen.area else ""
+            found.append(f"a stress of {toe.offset / 1e3:.3g} kPa{force} at no strain")
+        if found:
+            yield f"toe: {name}: {' and '.join(found)}, taken off"
+        if toe.error > MOST_TOE_ERROR:
+            yield f"toe: {name}: the record shows too little of its beginning: +- {100 * toe.error:.2g} % of the modulus"
     if curve.lost:
         yield f"gaps: {name}: {curve.lost} rows lack a number and are skipped"
-    if curve.skipped > 0.01 * len(curve.strain):
-        skipped = f"{curve.skipped} points skipped: the strain goes back, as in cycles; the first pull counts"
-        yield f"cycles: {name}: {skipped}"
+    if curve.cycles or curve.skipped > 0.01 * len(curve.strain):
+        times = f"rises again {curve.cycles} times" if curve.cycles else f"{curve.skipped} points were passed before"
+        yield f"cycles: {name}: the strain goes back, {times}, as in cycles; the first pull counts"
     if curve.specimen.crosshead:
         yield f"crosshead: {name}: strain by the crosshead's travel: grips and shoulders count as gauge length"
 

@@ -11,12 +11,14 @@ import numpy as np
 import typer
 
 from unitcad import catalogue, files
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.catalogue import Material, MaterialEntry, choose
-from unitcad.cli.output import console, print_indented, print_json, print_table, progress, warn
+from unitcad.cli.output import print_indented, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
+from unitcad.cli.tables import console, print_table
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal
 from unitcad.export.chart import Series, chart
+from unitcad.json_text import rounded
 from unitcad.lab.material import (
     DynamicResult,
     Specimen,
@@ -31,7 +33,7 @@ from unitcad.lab.material import (
 from unitcad.lab.readers import Layout
 from unitcad.lab.units import COLUMN_UNITS
 from unitcad.rooms import expect_none_but
-from unitcad.spec import convert, read_toml
+from unitcad.spec import convert
 from unitcad.text import some, toml, toml_key
 
 _SHOWN_TO = 1.2
@@ -48,7 +50,7 @@ def entry_of(tensile: TensileResult | None, dynamic: DynamicResult | None, like:
         )
         at_100 = next(row for row in tensile.rows if row.method.startswith("secant at 100 %"))
         if at_100.value is not None and at_100.value > 0:
-            widened = float(np.exp(np.hypot(tensile.scatter or 0.0, tensile.geometry)))
+            widened = float(np.exp(np.hypot(np.hypot(tensile.scatter or 0.0, tensile.geometry), tensile.start)))
             entry["modulus_100pct_kpa"] = _value(
                 at_100.value / 1e3, at_100.value / widened / 1e3, at_100.value * widened / 1e3, at_100.method, source
             )
@@ -72,7 +74,7 @@ def as_data(
         found["tensile"] = {
             "quasistatic": quasistatic(tensile, hertz),
             "methods_factor": tensile.spread, "scatter_of_specimens": tensile.scatter,
-            "cross_section": tensile.geometry,
+            "cross_section": tensile.geometry, "toe": tensile.start,
             "methods": [
                 {
                     "method": row.method, "value_kpa": _kpa(row.value),
@@ -82,7 +84,13 @@ def as_data(
                 for row in tensile.rows
             ],
             "warnings": list(tensile.warnings),
-            "files": [{"name": curve.name, "sha256": curve.sha256} for curve in tensile.curves],
+            "files": [
+                {
+                    "name": curve.name, "sha256": curve.sha256,
+                    "slack": toe.origin if toe else None, "offset_kpa": toe.offset / 1e3 if toe else None,
+                }
+                for curve, toe in zip(tensile.curves, tensile.toes, strict=True)
+            ],
         }  # fmt: skip
     if dynamic:
         found["dynamic"] = {
@@ -107,7 +115,7 @@ def tensile_chart(name: str, result: TensileResult) -> str:
         series.append(Series(curve.name, 100 * curve.strain[kept], curve.stress[kept] / 1e3, points=True))
     if toe := result.toes[0]:
         strain = np.linspace(toe.origin, result.used[1] + max(toe.origin, 0.0), 60)
-        series.append(Series("start, origin fitted", 100 * strain, toe.stress(strain) / 1e3))
+        series.append(Series("start, slack and offset fitted", 100 * strain, toe.stress(strain) / 1e3))
     low, high = (100 * end for end in result.used)
     title = f"{name}: nominal stress, quasi-static; shaded: the strain of use"
     return chart(series, title, "engineering strain, %", "nominal stress, kPa", shaded=(low, high))
@@ -301,7 +309,7 @@ def _print_tensile(name: str, result: TensileResult, found: dict[str, Any]) -> N
     scatter = "not known" if result.scatter is None else f"+- {100 * result.scatter:.2g} %"
     print_indented(
         f"range: the methods that could be defended differ by {result.spread:.3g}; "
-        f"specimens {scatter}, cross-section +- {100 * result.geometry:.2g} %"
+        f"specimens {scatter}, toe +- {100 * result.start:.2g} %, cross-section +- {100 * result.geometry:.2g} %"
     )
     for one in result.warnings:
         warn(f"warning: {one}")

@@ -15,10 +15,10 @@ import numpy as np
 import typer
 
 from unitcad import files
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
 from unitcad.export.chart import Series, chart
+from unitcad.json_text import rounded
 from unitcad.lab import bandpass, measuring
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measuring import Measured

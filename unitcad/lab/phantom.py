@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,15 +14,16 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta, Struct
 
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
 from unitcad.catalogue import entries as kinds
 from unitcad.catalogue.entries import between
 from unitcad.designs import layer_colour
+from unitcad.documents import parse_toml
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import tissue_layer
+from unitcad.json_text import rounded
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
@@ -88,7 +88,7 @@ LOSS_FACTOR = (0.2, 0.1, 0.3)
 @cache
 def thinned() -> dict[str, Any]:
     """Return the moduli of silicones with thinner by silicone, and their `source`."""
-    return tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
+    return parse_toml((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"), "thinned.toml")
 
 
 @dataclass(frozen=True)

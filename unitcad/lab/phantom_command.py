@@ -12,13 +12,13 @@ from typing import Annotated
 import typer
 
 from unitcad import files
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, for_casting
 from unitcad.catalogue import printers
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.export import printing, svg
 from unitcad.export.printing import print_ready
+from unitcad.json_text import rounded
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.lab.phantom import (
     LOSS_FACTOR,

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.estimates import rounded
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats
+from unitcad.json_text import rounded
 from unitcad.lab import bandpass
 from unitcad.lab.campaign import Campaign, ChainTable, RecordingTable, SensorTable
 from unitcad.lab.line import (

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.geometry.arrays import Floats, cross, extent
+from unitcad.geometry.arrays import Floats, Ints, cross, extent
 from unitcad.geometry.boxes import box_pairs
 from unitcad.meshcheck.findings import Facts, Finding, Location, counted, drawn_meshes, ending, number, point
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, representable, solid_of, weld_exact
@@ -149,14 +149,19 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
 
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
-    """Return the location with its triangles and the number of their mesh where findings are drawn."""
+    """Return the location with its middle and, where findings are drawn, its triangles and the number of their mesh."""
+    if place.mesh is not None or place.centre is not None:
+        return place
     meshes = drawn_meshes()
-    if place.mesh is not None or meshes is None:
-        return place
     region = place.region if place.region is not None else np.array(place.faces, np.int64)
-    if not len(region) and place.xyz is None:
-        return place
-    return replace(place, region=region, mesh=next(i for i, known in enumerate(meshes) if known is mesh))
+    centre = place.xyz
+    if len(region) and (place.region is not None or len(region) > 1 or centre is None):
+        low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
+        centre = point((low + high) / 2) if np.isfinite([low, high]).all() else None
+    if meshes is None or (not len(region) and place.xyz is None):
+        return replace(place, region=None, centre=centre)
+    number = next(i for i, known in enumerate(meshes) if known is mesh)
+    return replace(place, region=region, mesh=number, centre=centre)
 
 
 def _with_file_places(place: Location, mesh: Mesh) -> Location:
@@ -198,6 +203,13 @@ def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[l
         places = (replace(place, part=place.part and package.shown(place.part)) for place in item.locations)
         findings[i] = replace(item, locations=tuple(places))
     return findings, facts
+
+
+def placed_meshes(data: memoryview, options: Options, deadline: Deadline) -> list[tuple[Floats, Ints]]:
+    """Return vertices (n, 3), mm, and faces (m, 3) of the instances of a 3MF. Raises `Unreadable`."""
+    build = read_build(open_package(data, options.limits, deadline), options.limits)
+    meshes = [] if build is None else [one.mesh(placed=True) for one in build.instances]
+    return [(mesh.vertices, mesh.faces) for mesh in meshes if mesh.faces.max(initial=-1) < len(mesh.vertices)]
 
 
 def _measure_turned(instance: Instance) -> tuple[Floats, float, float]:
@@ -312,8 +324,13 @@ def check_printability(instances: Sequence[Instance], printer: Printer, deadline
 def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:
     """Return the findings of an instance that lies elsewhere on the bed."""
     for item in findings:
-        places = (replace(place, xyz=point(place.xyz + by)) if place.xyz else place for place in item.locations)
+        places = (_moved(place, by) for place in item.locations)
         yield replace(item, locations=tuple(places))
+
+
+def _moved(place: Location, by: Floats) -> Location:
+    xyz, centre = (None if at is None else point(np.add(at, by)) for at in (place.xyz, place.centre))
+    return replace(place, xyz=xyz, centre=centre)
 
 
 def check_step(path: Path, data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:

@@ -10,6 +10,7 @@ import glob
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -22,11 +23,11 @@ from unitcad.errors import UnitcadError
 from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
-from unitcad.meshcheck.builds import check_3mf, check_on_bed, check_step, check_surface
-from unitcad.meshcheck.findings import Facts, FileReport, Finding, drawing, ending, merge
-from unitcad.meshcheck.geometry.mesh import Mesh
+from unitcad.meshcheck.builds import check_3mf, check_on_bed, check_step, check_surface, placed_meshes
+from unitcad.meshcheck.findings import MOST_COUNTED, SHOWN, Facts, FileReport, Finding, ending, keeping_places, merge
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh
 from unitcad.meshcheck.readers import kind_of
-from unitcad.meshcheck.readers.read_step import missing
+from unitcad.meshcheck.readers.read_step import measured, missing
 from unitcad.meshcheck.rules import g_shells, s_scale
 from unitcad.meshcheck.rules.f_file import F001, F005, F011, F012, Deadline, Limits, OutOfTime, Unreadable, keeping
 from unitcad.meshcheck.rules.inspection import Options
@@ -112,7 +113,7 @@ def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileR
 
 def _check_with(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
     meshes: list[Mesh] | None = [] if options.draw else None
-    with drawing(meshes):
+    with keeping_places(MOST_COUNTED if options.draw or options.every_place else SHOWN, meshes):
         try:
             with keeping():
                 findings, facts = work(Deadline(options.limits.seconds))
@@ -124,18 +125,8 @@ def _check_with(path: str, options: Options, work: Callable[[Deadline], tuple[Se
 
 def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
     """Check a file by its content; without `data` it is read."""
-    if data is None:
-        data = _bytes_of(path, options.limits)
-    kind = readers.kind_of(path.name)
-    if not kind:
-        known = ", ".join(sorted(readers.SUFFIXES))
-        raise F005.unreadable(f"suffix {path.suffix!r} is not a mesh format; known: {known}")
-    if not data:
-        raise F001.unreadable("the file is empty")
-    content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP"}.get(kind)
-    if content != wanted:
-        raise F005.unreadable(f"named {path.suffix}, but the content is {content or f'no {wanted}'}")
-    view = memoryview(data)
+    kind, view = _of_kind(data, path, options)
+    del data
     if kind == "3mf":
         return check_3mf(view, options, deadline)
     if kind == "step":
@@ -143,7 +134,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     findings: list[Finding] = []
     with keeping(findings, change=ending):
         mesh = readers.reader_of(kind)(view, options.limits, deadline, findings)
-    del view, data
+    del view
     if mesh is None:
         return ending(findings), Facts()
     factor = UNITS_MM[options.unit] if options.unit else 1.0
@@ -152,6 +143,39 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     with keeping(findings):
         more, facts = _check_surface(mesh, options, deadline)
     return findings + more, facts
+
+
+def _of_kind(data: bytes | None, path: Path, options: Options) -> tuple[str, memoryview]:
+    """Return the format and the content of a file. Raises `Unreadable` if they contradict."""
+    if data is None:
+        data = _bytes_of(path, options.limits)
+    kind = readers.kind_of(path.name)
+    if not kind:
+        raise F005.unreadable(readers.unknown(path.suffix))
+    if not data:
+        raise F001.unreadable("the file is empty")
+    content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP"}.get(kind)
+    if content != wanted:
+        raise F005.unreadable(f"named {path.suffix}, but the content is {content or f'no {wanted}'}")
+    return kind, memoryview(data)
+
+
+def surface_of(path: Path, options: Options, deadline: Deadline) -> Floats:
+    """Return the triangles (n, 3, 3) of a file as it is placed, mm, without those that are not finite.
+
+    Raises `Unreadable`.
+    """
+    kind, view = _of_kind(None, path, options)
+    if kind == "3mf":
+        meshes = placed_meshes(view, options, deadline)
+    elif kind == "step":
+        meshes = list(measured(path, view, options.limits.seconds).meshes)
+    else:
+        mesh = readers.reader_of(kind)(view, options.limits, deadline, [])
+        factor = UNITS_MM[options.unit] if options.unit else 1.0
+        meshes = [] if mesh is None else [(mesh.vertices * factor, mesh.faces)]
+    corners = np.concatenate([np.empty((0, 3, 3)), *(vertices[faces] for vertices, faces in meshes)])
+    return corners[(np.abs(corners) <= LARGEST).all(axis=(1, 2))]
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:
@@ -262,6 +286,7 @@ def check_files(
 
 def check_guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
     """Call `check_file` with an alarm behind its clock; an inner fault becomes a finding, not a crash."""
+    start = time.monotonic()
     try:
         with _alarm(options.limits.seconds):
             report = check_file(path, options)
@@ -275,6 +300,7 @@ def check_guarded(path: str, options: Options, then: Then | None = None) -> File
         report = _report_stop(
             path, f"the check itself failed ({type(error).__name__}: {error}); please report the file"
         )
+    report = replace(report, seconds=time.monotonic() - start)
     return then(report) if then else report
 
 

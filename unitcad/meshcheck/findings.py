@@ -14,30 +14,30 @@ from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.text import number
 
 SHOWN = 5
-"""Locations of a finding; its count says how many there are."""
-_DRAWN = 10_000
-"""Locations of a finding that are drawn."""
-_MESHES: ContextVar[list[Mesh] | None] = ContextVar("meshes", default=None)
+"""Locations of a finding unless all are needed; its count says how many there are."""
+MOST_COUNTED = 10_000
+"""Places of a finding that are counted one by one, and kept for pictures and baselines."""
+_KEPT: ContextVar[tuple[int, list[Mesh] | None]] = ContextVar("kept", default=(SHOWN, None))
 
 
 def drawn_meshes() -> list[Mesh] | None:
     """Return the list that collects the meshes with a finding, None if findings are not drawn."""
-    return _MESHES.get()
+    return _KEPT.get()[1]
 
 
 def most_locations() -> int:
     """Return how many locations of a finding are kept."""
-    return SHOWN if drawn_meshes() is None else _DRAWN
+    return _KEPT.get()[0]
 
 
 @contextlib.contextmanager
-def drawing(meshes: list[Mesh] | None) -> Iterator[None]:
-    """Collect meshes, and keep more locations, if there is a list, until the block ends."""
-    before = _MESHES.set(meshes)
+def keeping_places(most: int, meshes: list[Mesh] | None = None) -> Iterator[None]:
+    """Keep so many locations of a finding, and collect meshes if there is a list, until the block ends."""
+    before = _KEPT.set((most, meshes))
     try:
         yield
     finally:
-        _MESHES.reset(before)
+        _KEPT.reset(before)
 
 
 SEVERITIES = ("info", "warning", "error")
@@ -67,6 +67,7 @@ class Location:
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
     `line` is that of the first face if the format has lines, otherwise that of the fault. For pictures: `region`, its
     triangles in the mesh of number `mesh`, and `layer`, the layer that the finding spoils most.
+    `centre`: the middle of the place, the same in whatever order the faces are, mm.
     """
 
     face: int | None = None
@@ -78,6 +79,7 @@ class Location:
     region: Any = field(default=None, compare=False, repr=False)
     mesh: int | None = field(default=None, compare=False, repr=False)
     layer: Any = field(default=None, compare=False, repr=False)
+    centre: Point | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.faces and self.face is None:
@@ -117,9 +119,10 @@ class Location:
 
 @dataclass(frozen=True)
 class Finding:
-    """One rule that a file breaks: how often, and its first places.
+    """One rule that a file breaks: how often, up to MOST_COUNTED, and its first places.
 
-    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it.
+    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it. `known`: a baseline, or
+    the old version, has it, and it does not fail.
     """
 
     code: str
@@ -128,6 +131,7 @@ class Finding:
     count: int = 1
     locations: tuple[Location, ...] = ()
     ends: bool = False
+    known: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return it JSON-ready."""
@@ -137,6 +141,7 @@ class Finding:
             "message": self.message,
             "count": self.count,
             "locations": [place.as_dict() for place in self.locations],
+            "known": self.known,
         }
 
 
@@ -157,22 +162,48 @@ class Facts:
         return vars(self) | {"bbox_mm": self.bbox_mm and [list(corner) for corner in self.bbox_mm]}
 
 
+CHANGES = ("unchanged", "changed", "new", "gone")
+
+
+@dataclass(frozen=True)
+class Change:
+    """Difference of a file from its old version: one of CHANGES; `unchanged` files have the same bytes.
+
+    `old` are the facts of the old version, `gone` the findings that only it has. No point of one surface is farther than
+    `distance_mm` from the other one, but for `error_mm`; None if one of them could not be read.
+    """
+
+    kind: str
+    old: Facts = field(default_factory=Facts)
+    gone: tuple[Finding, ...] = ()
+    distance_mm: float | None = None
+    error_mm: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it JSON-ready."""
+        parts = {"old": self.old.as_dict(), "gone": [item.as_dict() for item in self.gone]}
+        return {"change": self.kind, **parts, "distance_mm": self.distance_mm, "error_mm": self.error_mm}
+
+
 @dataclass(frozen=True, repr=False)
 class FileReport:
     """A file's findings, sorted by severity and code, and its facts.
 
-    `meshes`: those that the locations number, if `Options.draw` is set.
+    `meshes`: those that the locations number, if `Options.draw` is set. `seconds`: wall time of the check, if known.
+    `change`: its difference from an old version, if there is one.
     """
 
     path: str
     findings: tuple[Finding, ...] = ()
     facts: Facts = field(default_factory=Facts)
     meshes: tuple[Mesh, ...] = field(default=(), compare=False, repr=False)
+    seconds: float | None = field(default=None, compare=False)
+    change: Change | None = None
 
     @property
     def verdict(self) -> str:
-        """`error`, `warning` or `pass`: the worst finding, infos aside."""
-        severities = {finding.severity for finding in self.findings}
+        """`error`, `warning` or `pass`: the worst finding, infos and known ones aside."""
+        severities = {finding.severity for finding in self.findings if not finding.known}
         return "error" if "error" in severities else "warning" if "warning" in severities else "pass"
 
     def __repr__(self) -> str:
@@ -191,7 +222,15 @@ class FileReport:
             "verdict": self.verdict,
             "findings": [finding.as_dict() for finding in self.findings],
             "facts": self.facts.as_dict(),
-        }
+        } | ({} if self.change is None else self.change.as_dict())
+
+    def shortened(self) -> FileReport:
+        """Return the report with SHOWN locations a finding and without meshes."""
+        findings = tuple(replace(item, locations=item.locations[:SHOWN]) for item in self.findings)
+        change = self.change and replace(
+            self.change, gone=tuple(replace(item, locations=item.locations[:SHOWN]) for item in self.change.gone)
+        )
+        return replace(self, findings=findings, meshes=(), change=change)
 
 
 class Unreadable(Interrupted):
@@ -227,6 +266,11 @@ def counted(n: int, one: str, many: str = "") -> str:
     return f"{n} {one if n == 1 else many or one + 's'}"
 
 
+def tally(n: int, one: str, many: str = "") -> str:
+    """Write `2 edges` as `counted` does, and `more than 10,000 edges` from there on."""
+    return counted(n, one, many) if n <= MOST_COUNTED else f"more than {MOST_COUNTED:,} {many or one + 's'}"
+
+
 def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Merge to one finding a rule, the worst first.
 
@@ -242,11 +286,12 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def _together(alike: list[Finding]) -> Finding:
     count = sum(finding.count for finding in alike)
     message = "; and ".join(list(dict.fromkeys(finding.message for finding in alike))[:2])
+    whole = count if count < MOST_COUNTED else f"{MOST_COUNTED:,} or more"
     return Finding(
         alike[0].code,
         max((finding.severity for finding in alike), key=SEVERITIES.index),
-        f"{message} ({count} in all)" if len(alike) > 1 else message,
-        count,
+        f"{message} ({whole} in all)" if len(alike) > 1 else message,
+        min(count, MOST_COUNTED),
         tuple(islice(chain.from_iterable(finding.locations for finding in alike), most_locations())),
         any(finding.ends for finding in alike),
     )

@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
-
-import msgspec
+from typing import Any
 
 from unitcad import files
-from unitcad.errors import Refusal, UnitcadError, misfit
+from unitcad.documents import read_json
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.meshcheck.findings import FileReport, counted, merge
 from unitcad.meshcheck.rules.inspection import Options, Printer
 from unitcad.meshcheck.rules.m_manifest import M004, M005, ListedFile, check_listed
@@ -32,25 +32,21 @@ class Listing:
     outside: tuple[str, ...] = ()
 
 
-class _File(msgspec.Struct):
-    path: str
-    sha256: str | None = None
-    copies: int = 1
+def _items(value: Any, kind: type[dict[Any, Any]] | type[list[Any]], place: str) -> Any:
+    """Return the value of a key that has a list or a table. Raises ValueError for another one."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{place} has a value of the wrong kind")
+    return value
 
 
-class _Part(msgspec.Struct):
-    name: str
-    role: str
-    files: dict[str, _File]
-    volume_mm3: float | None = None
-    solids: int = 1
-
-
-class _Manifest(msgspec.Struct):
-    """The part of a build's manifest that is read."""
-
-    parts: list[_Part]
-    printer: object = None
+def _value(table: dict[str, Any], key: str, kind: Any, place: str, *default: Any) -> Any:
+    """Return the value of a table's key. Raises ValueError for another kind, and for a missing one without `default`."""
+    if key not in table and not default:
+        raise ValueError(f"{place} lacks the key {key!r}")
+    value = table.get(key, *default)
+    if (default and value == default[0]) or (isinstance(value, kind) and not isinstance(value, bool)):
+        return value
+    raise ValueError(f"{place}.{key} has a value of the wrong kind")
 
 
 def read(where: str) -> Listing:
@@ -58,23 +54,43 @@ def read(where: str) -> Listing:
     path = Path(where)
     path = path / "manifest.json" if path.is_dir() else path
     try:
-        manifest = msgspec.convert(files.read_json(path), _Manifest)
+        manifest = read_json(path)
     except UnitcadError as error:
         raise Refusal("--manifest", str(where), f"cannot be read: {error}") from error
-    except msgspec.ValidationError as error:
-        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {misfit(error)}") from error
+    try:
+        listed, outside = _listed(path, _items(manifest, dict, "its top level"))
+    except ValueError as error:
+        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {error}") from error
+    printer = manifest.get("printer")
+    return Listing(path, listed, printer if isinstance(printer, str) else None, tuple(outside))
+
+
+def _listed(path: Path, manifest: dict[str, Any]) -> tuple[dict[str, ListedFile], list[str]]:
+    """Return the files of a manifest by absolute path, and the paths that lead outside its folder. Raises ValueError."""
     listed: dict[str, ListedFile] = {}
     outside: list[str] = []
-    for part in manifest.parts:
-        for file in part.files.values():
-            if leads_outside(path.parent, file.path):
-                outside.append(file.path)
+    for i, entry in enumerate(_value(manifest, "parts", list, "its top level")):
+        place = f"parts[{i}]"
+        part = _items(entry, dict, place)
+        name, role = (_value(part, key, str, place) for key in ("name", "role"))
+        whole = _value(part, "volume_mm3", int | float, place, None)
+        solids = _value(part, "solids", int, place, 1)
+        for key, entry in _value(part, "files", dict, place).items():
+            within = f"{place}.files.{key}"
+            file = _items(entry, dict, within)
+            shown = _value(file, "path", str, within)
+            copies, digest = (
+                _value(file, key, kind, within, default)
+                for key, kind, default in (("copies", int, 1), ("sha256", str, None))
+            )
+            if leads_outside(path.parent, shown):
+                outside.append(shown)
                 continue
-            place = os.path.abspath(path.parent / file.path)
-            volume = None if part.volume_mm3 is None else file.copies * part.volume_mm3
-            new = ListedFile((part.name,), part.role == "tool", file.sha256, volume, file.copies * part.solids)
-            listed[place] = _together(listed[place], new) if place in listed else new
-    return Listing(path, listed, manifest.printer if isinstance(manifest.printer, str) else None, tuple(outside))
+            at = os.path.abspath(path.parent / shown)
+            volume = None if whole is None else copies * whole
+            new = ListedFile((name,), role == "tool", digest, volume, copies * solids)
+            listed[at] = _together(listed[at], new) if at in listed else new
+    return listed, outside
 
 
 def leads_outside(folder: Path, listed: str) -> bool:

@@ -42,8 +42,9 @@ from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
 from unitcad.moulds.layout import Frame
 from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, lid_piece
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
-from unitcad.shape.profile import GRID_PER_MM
+from unitcad.shape.profile import FACETS, GRID_PER_MM
 from unitcad.spec import Spec
+from unitcad.spec.custom_code import is_body_file
 
 LEAST_AREA = 2.0
 """Of an opening that silicone is poured or injected into, mm2 (assumed): a thread or a needle of 1.6 mm."""
@@ -61,8 +62,15 @@ MITRE = 3.0
 """How many clearances a sharp corner's copy moves out, at most: as far as a corner of 39 degrees needs."""
 
 
-def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+Channels = Callable[[int, Manifold, float], Sequence[tuple[Shape, Shape]]]
+"""From a pour (from 0), its layer and the top of its closed cup to the channels: each as drilled, and as filled."""
+
+
+def complement(spec: Spec, cast: Sequence[Shape], roof: float = 0.0, gates: Channels | None = None) -> Tooling:
     """Return the moulds of the layers `cast`, in the order of their pours, drawn about the unit's axis.
+
+    With `gates` a cup whose layer has too small an opening above is closed by a roof of `roof` mm, and filled through
+    them.
 
     If inserts of the design lead out of the silicone, the base carries them, and the cup has a slot for them, open
     downwards. Raises Refusal, with the pour and the place, for layers that leave a loose piece of mould.
@@ -83,10 +91,14 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     def there(layer: int) -> Sequence[Shape]:
         return laid if layer + 1 >= laid_in else ()
 
-    injected = spec.moulds.pour == "injected"
+    injected, least = spec.moulds.pour == "injected", films(spec)
     standing, hung, tops = _carried(spec, cast, there, solids, rims, max(radii), segments)
+    closed = [gates is not None and not _is_open(spec, solid, rim) for solid, rim in zip(solids, rims, strict=True)]
     for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)):
-        _check_opening(spec, i, solid, rim)
+        if not closed[i]:
+            _check_opening(spec, i, solid, rim)
+    rims = tuple(rim + roof * shut for rim, shut in zip(rims, closed, strict=True))
+    gated = [gates(i, solids[i], rims[i]) if gates and shut else () for i, shut in enumerate(closed)]
     if laid:
         seat = max(radii) + spec.moulds.land_mm + spec.moulds.groove_width_mm
         standing = [Common((piece, box(-seat, seat, -seat, seat, -BEYOND, tops))) for piece in standing]
@@ -113,29 +125,34 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             for piece, solid in zip(standing, solid_of, strict=True)
             if wall.min_gap(solid, 2 * clearance) < clearance
         ]
-        overflow = grooves(frame, i)
+        overflow = [] if closed[i] else grooves(frame, i)
         own = realise(groove(frame, i, replace(lay.cells[0], x=0.0, y=0.0)), segments)
         if any(own.min_gap(realise(hole, segments), wall_kept) < wall_kept for hole in slid):
             overflow = []
         grooved.append(bool(overflow))
         bores, holes = in_cells([under]), in_cells(slid)
-        cup = cut(blank, [recess(frame), *bores, *holes, *overflow])
-        parted = _pieces(realise(cup, segments))
+        drilled = in_cells([shape for shape, _ in gated[i]])
+        cup = cut(blank, [recess(frame), *bores, *holes, *overflow, *drilled])
+        parted = _pieces(realise(cup, segments), least)
         if len(parted) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
             elsewhere = [realise(shape, segments) for shape in (cup, base, *in_cells(hung[i]))]
-            for lost in _pieces(Manifold.batch_boolean([Manifold.compose(parted), *elsewhere], OpType.Subtract)):
+            for lost in _pieces(Manifold.batch_boolean([Manifold.compose(parted), *elsewhere], OpType.Subtract), least):
                 raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
         cups.append(cup)
         # Down into the plinth too: faces that only touch could leave a passage of no width.
         rest = Cut(blank, tuple(bores))
         sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells([*standing, *there(i)]))),) if holes else ())
     tools, channels = [base_piece(base), *(cup_piece(i + 1, cup) for i, cup in enumerate(cups))], []
-    for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)) if injected else ():
+    for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)) if injected and not any(closed) else ():
         drilled, poured = (lid.channels_over(frame, i, solid.slice(rim - _UNDER), by) for by in (BEYOND, 0.0))
         tools.append(lid_piece(i + 1, lid.lid(frame, i, drilled, in_cells(hung[i]))))
         channels.append(tuple(poured))
-    tools += [] if injected else [blade_piece(blade(lay, dims.heights[-1]))]
+    tools += [] if injected or all(closed) else [blade_piece(blade(lay, dims.heights[-1]))]
+    if any(closed):
+        filled = tuple(tuple(moved(shape, c.x, c.y) for c in lay.cells for _, shape in each) for each in gated)
+        seals, grooved_of = tuple(sealed), tuple(grooved)
+        return Tooling(dims, lay, tuple(tools), seals, filled, grooved_of, tops=rims, gated=tuple(closed))
     return Tooling(dims, lay, tuple(tools), tuple(sealed), tuple(channels), tuple(grooved))
 
 
@@ -157,15 +174,28 @@ def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tupl
     return tuple(rims), tuple(radii)
 
 
-def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
-    """Raise Refusal if a layer's opening at its rim is too small to pour silicone through."""
+def _least_width(spec: Spec) -> float:
+    return lid.LEAST_VENT if spec.moulds.pour == "injected" else LEAST_WIDTH
+
+
+def _is_open(spec: Spec, solid: Manifold, rim: float) -> bool:
+    """Tell whether a layer's opening at its rim is large enough to pour silicone through, or for the vents of a lid."""
     width, area = max(regions(solid, rim), default=(0.0, 0.0))
-    if area >= LEAST_AREA and width >= LEAST_WIDTH:
+    return area >= LEAST_AREA and width >= _least_width(spec)
+
+
+def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
+    """Raise Refusal if a layer's opening at its rim is too small."""
+    if _is_open(spec, solid, rim):
         return
+    injected, wide = spec.moulds.pour == "injected", _least_width(spec)
+    width, area = max(regions(solid, rim), default=(0.0, 0.0))
     corners = arrays(solid)[0]
     x, y, z = corners[corners[:, 2].argmax()]
     opening = f"an opening of {area:.2g} mm2 in the rim that takes a circle of {width:.2g} mm"
-    least = f"to pour silicone takes {LEAST_AREA:g} mm2 and a circle of {LEAST_WIDTH:g} mm"
+    least = (
+        f"{'a lid with vents' if injected else 'to pour silicone'} takes {LEAST_AREA:g} mm2 and a circle of {wide:g} mm"
+    )
     why = f"the layer's top, at x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm, leaves {opening}; {least}: "
     raise _refused(spec, layer, f"{why}give it a flat top, such as a disc of {FLAT:g} mm, or turn it over")
 
@@ -184,8 +214,9 @@ def _carried(
     Raises Refusal for a piece that would hang in the air, and for one in the place of a later layer.
     """
     filled = (*cast, *there(len(cast) - 1))
-    under = _without_films(Cut(Below(union(filled), 0.0), filled), segments)
-    held = _pieces(realise(under, segments))
+    least = films(spec)
+    under = _without_films(Cut(Below(union(filled), 0.0), filled), segments, least)
+    held = _pieces(realise(under, segments), least)
     for piece in held:
         if not _stands(piece):
             raise _refused(spec, len(cast) - 1, f"a hollow of {_place(piece)} is closed in by silicone below and above")
@@ -197,7 +228,7 @@ def _carried(
             raise _refused(spec, i, f"an insert reaches above the rim at z = {rim:.4g} mm")
         beneath = Below(union((*cast[: i + 1], *there(i))), -BEYOND)
         beside = Cut(box(-edge, edge, -edge, edge, -BEYOND, rim), (beneath,))
-        for piece in _pieces(realise(beside, segments)):
+        for piece in _pieces(realise(beside, segments), least):
             if bounds(piece)[3] > edge - LEVEL:
                 continue
             if not _stands(piece):
@@ -212,21 +243,29 @@ def _carried(
             if i == len(rims) - 1:
                 held.append(above)
                 standing.append(Component(beside, _inside(piece)))
-            elif thick_pieces(above - Manifold.compose(held)):
+            elif thick_pieces(above - Manifold.compose(held), least):
                 why = f"a loose piece of {_place(above)} is in layer {i + 1}, and a later layer takes its place"
                 raise _refused(spec, i, why)
         needed = realise(Cut(Below(union(cast[: i + 1]), 0.0), tuple(cast[: i + 1])), segments)
         for j in range(i + 1, len(cast)):
             lost = needed ^ solids[j]
-            if thick_pieces(lost):
+            if thick_pieces(lost, least):
                 why = f"layer {j + 1} is under layer {i + 1} in a space of {_place(lost)}, in the place of its core"
                 raise _refused(spec, i, why)
     return standing, hung, max([bounds(piece)[5] for piece in held], default=LEVEL)
 
 
-def _pieces(solid: Manifold) -> list[Manifold]:
-    """Return the connected pieces, lowest first, without scraps of facets and rounding."""
-    return sorted(thick_pieces(solid), key=bounds)
+def films(spec: Spec) -> float:
+    """Return the thickness up to which a piece is a film of facets or rounding, mm.
+
+    In a body from a file, facets on either side of a film are each off the surface that was meant, and on the grid.
+    """
+    return 2 * (FACETS + LEVEL) if is_body_file(spec.design) else FACETS
+
+
+def _pieces(solid: Manifold, least: float) -> list[Manifold]:
+    """Return the connected pieces, lowest first, without films up to `least` (mm) of facets and rounding."""
+    return sorted(thick_pieces(solid, least), key=bounds)
 
 
 def _stands(piece: Manifold) -> bool:
@@ -234,21 +273,21 @@ def _stands(piece: Manifold) -> bool:
     return bool(thick_parts(piece.slice(LEVEL / 2)))
 
 
-def _without_films(shape: Shape, segments: int) -> Shape:
+def _without_films(shape: Shape, segments: int, least: float) -> Shape:
     """Return a shape whose pieces have no films, which rounding leaves upright between two faces in one plane.
 
     A film has area and no volume, and faces nowhere upwards: none is under the upward faces.
     """
-    kept = _pieces(realise(shape, segments))
+    kept = _pieces(realise(shape, segments), least)
     if not kept:
         return shape
     whole = Manifold.compose(kept)
     low, area = bounds(whole)[2], whole.surface_area()
-    cleared, least = shape, area - FILM
+    cleared, smallest = shape, area - FILM
     for other in (Below(shape, low), Common((shape, Below(shape, low - BEYOND)))):
         solid = realise(other, segments)
-        if solid.surface_area() < least and abs(solid.volume() - whole.volume()) < LEVEL**2 * area:
-            cleared, least = other, solid.surface_area()
+        if solid.surface_area() < smallest and abs(solid.volume() - whole.volume()) < LEVEL**2 * area:
+            cleared, smallest = other, solid.surface_area()
     return cleared
 
 
@@ -282,7 +321,7 @@ def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float,
         hole = _grown(under, clearance, corners)
     if rim - spec.moulds.least_wall_mm < top < rim:
         column = _grown(Below(moved(piece, z=rim), -2 * BEYOND), clearance, corners)
-        if len(_pieces(wall - realise(column, segments))) <= len(_pieces(wall)):
+        if len(_pieces(wall - realise(column, segments), FACETS)) <= len(_pieces(wall, FACETS)):
             return column
     return hole
 

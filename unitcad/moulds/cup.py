@@ -116,7 +116,9 @@ class Rib:
 
 
 def ribs(frame: Frame) -> tuple[Rib, ...]:
-    """Return the ribs of every cup of a set; () if the spec sets none, or the plinth's faces are too short."""
+    """Return the ribs of every cup of a set; () if there are none, or the plinth's faces are too short."""
+    if not frame.lay.ribs:
+        return ()
     moulds, lay, printer = frame.spec.moulds, frame.lay, printer_of(frame.spec)
     crest, leaf = float(printer.least_feature_mm), leaf_mm(printer)
     end = -moulds.plinth_height_mm + moulds.seat_relief_mm

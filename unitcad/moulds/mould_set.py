@@ -1,18 +1,20 @@
-"""A mould set: a spec's unit, tooling and pours, their meshes and cavities, each worked out when first asked for."""
+"""A mould set: a unit, tooling and pours, their meshes and cavities, each worked out when first asked for.
+
+A set is made of a spec. A room that casts something else, such as the sheet of an array, gives its own `Origin`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.catalogue import printers
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
-from unitcad.designs.design import Fitting
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import realise, segment_count, thick_parts
 from unitcad.moulds.base import plate_top
@@ -59,17 +61,70 @@ def forget() -> None:
     mesh.forget()
 
 
+Solids = tuple[tuple[str, tuple[Shape, ...]], ...]
+"""Solids by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """What a mould set is made from. A function is called once, when its result is needed.
+
+    bodies      all bodies of a unit; of an array the silicone that its units share, as cast
+    plan        tools and pours; raises Refusal if the moulds can't be made
+    segments    sides of every full turn in this set's meshes: one number, so that mating faces mate
+    dimensions  radii and heights of the unit; None: those of the plan
+    together    all solids of the finished product; None: the bodies
+    inner       from a set's spec and plan to the set of the inner layers, if these are cast flat and laid into the last
+                pour; otherwise None
+    reads       inputs of the geometry besides the spec, as a text
+    file        the file in a result's folder that makes the result again
+    unit        the spec of the unit that the bought parts are for
+    path        the path of that unit in the file
+    """
+
+    bodies: Callable[[], tuple[Body, ...]]
+    plan: Callable[[], Plan]
+    segments: Callable[[], int]
+    unit: Spec
+    dimensions: Callable[[], Dimensions] | None = None
+    together: Callable[[], Solids] | None = None
+    inner: Callable[[Spec, Plan], MouldSet | None] = lambda spec, plan: None
+    reads: str = ""
+    file: str = "spec.toml"
+    path: str = ""
+
+
+def origin_of(spec: Spec) -> Origin:
+    """Return the origin of a unit's set."""
+    design = design_of(spec)
+
+    def segments() -> int:
+        return segment_count(design.dimensions(spec).outer_radius, spec.output.tolerance_mm)
+
+    def drawn() -> Plan:
+        made = _drawn(to_json(with_formats(geometric(spec))))
+        poured = zip(made.steps, spec.layers, strict=True)
+        return replace(made, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
+
+    return Origin(
+        bodies=lambda: unit_bodies(spec),
+        plan=drawn,
+        segments=segments,
+        unit=spec,
+        dimensions=lambda: design.dimensions(spec),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class MouldSet:
     """A spec's unit and moulds. Lengths in mm, as assembled, z = 0 at the skin.
 
-    `altered` replaces the spec's own plan: a set with a fault, for tests. `given`: the paths of the values that a
-    person gave, in the file `source`; they count as measured.
+    `given`: the paths of the values that a person gave; they count as measured. `origin`: see `Origin`; None: the spec.
     """
 
     spec: Spec
-    altered: Plan | None = None
     given: frozenset[str] = frozenset()
+    origin: Origin | None = field(default=None, kw_only=True, repr=False)
     _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
     _meshes: dict[Shape, Manifold] = field(default_factory=dict, init=False, repr=False)
 
@@ -79,65 +134,52 @@ class MouldSet:
         return design_of(self.spec)
 
     @cached_property
-    def dimensions(self) -> Dimensions:
-        """Radii and heights."""
-        return self.design.dimensions(self.spec)
+    def source(self) -> Origin:
+        """What the set is made from."""
+        return self.origin or origin_of(self.spec)
 
     @cached_property
-    def blank(self) -> MouldSet:
+    def dimensions(self) -> Dimensions:
+        """Radii and heights."""
+        given = self.source.dimensions
+        return given() if given else self.plan.dimensions
+
+    @cached_property
+    def blank(self) -> Self:
         """The set of the same geometry with everything blank that the geometry does not read."""
         spec = geometric(self.spec)
-        return self if spec == self.spec else MouldSet(spec, self.altered)
+        return self if spec == self.spec else replace(self, spec=spec, given=frozenset())
 
     @cached_property
     def geometry(self) -> str:
-        """Inputs of the geometry, as JSON: the spec without formats and other keys that change no shape."""
-        return to_json(with_formats(self.spec)) if self.blank is self else self.blank.geometry
+        """Inputs of the geometry, as text: the spec without formats and other keys that change no shape."""
+        return to_json(with_formats(self.spec)) + self.source.reads if self.blank is self else self.blank.geometry
 
     @cached_property
     def unit(self) -> tuple[Body, ...]:
-        """The bodies of the unit."""
-        return unit_bodies(self.spec) if self.blank is self else self.blank.unit
-
-    @property
-    def parts(self) -> tuple[str, Spec]:
-        """The spec of the unit that the bought parts are for, and its path in the file `source`."""
-        return "", self.spec
+        """The bodies of the unit; of an array the silicone that its units share, as cast."""
+        return self.source.bodies() if self.blank is self else self.blank.unit
 
     @property
     def assumed(self) -> dict[str, str]:
-        """The assumption about each length of these parts that nobody has measured, by its key."""
-        path, spec = self.parts
-        return assumed_lengths(spec, self.given, path)
+        """The assumption about each length of the bought parts that nobody has measured, by its key."""
+        return assumed_lengths(self.source.unit, self.given, self.source.path)
 
     @cached_property
-    def laid_later(self) -> tuple[Body, ...]:
-        """Bodies that go into the silicone after casting, if `unit` is only the silicone."""
-        return ()
-
-    @cached_property
-    def pushed_in(self) -> tuple[Body, ...]:
-        """Bodies pushed into the cast sheet from its side towards the skin, each body's name after its place's."""
-        return ()
-
-    @cached_property
-    def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
+    def together(self) -> Solids:
         """All solids of the finished unit, by name: its bodies, and those that go in after casting."""
-        return tuple((body.name, (body.shape,)) for body in (*self.unit, *self.laid_later))
+        given = self.source.together
+        return given() if given else tuple((body.name, (body.shape,)) for body in self.unit)
 
-    @property
-    def cast_flat(self) -> MouldSet | None:
+    @cached_property
+    def inner(self) -> MouldSet | None:
         """The set of only the inner layers, if these are cast flat and laid into the last pour; otherwise None."""
-        return None
+        return self.source.inner(self.spec, self.plan)
 
     @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal if the moulds can't be made."""
-        if self.altered:
-            return self.altered
-        drawn = _drawn(self.geometry)
-        poured = zip(drawn.steps, self.spec.layers, strict=True)
-        return replace(drawn, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
+        return self.source.plan()
 
     @cached_property
     def frame(self) -> Frame:
@@ -147,8 +189,7 @@ class MouldSet:
     @cached_property
     def segments(self) -> int:
         """Sides of every full turn in this set's meshes: one number, so that mating faces mate."""
-
-        return segment_count(self.dimensions.outer_radius, self.spec.output.tolerance_mm)
+        return self.source.segments()
 
     @property
     def facets(self) -> float:
@@ -171,25 +212,10 @@ class MouldSet:
         return self._meshes[shape]
 
     @property
-    def makes(self) -> str:
-        """The product of the mould."""
-        return "unit"
-
-    @property
-    def across(self) -> str:
-        """The part to measure across, if the tooling is not concentric."""
-        return f"Farthest corner from the axis: {self.plan.dimensions.outer_radius:.2f} mm."
-
-    @property
-    def source(self) -> str:
-        """The file in a result's folder that makes the result again."""
-        return "spec.toml"
-
-    @property
-    def assembly(self) -> tuple[Fitting, ...]:
-        """How motor and circuit go into the body, or into the mould, in the design's words; () if it has none."""
-        said = self.design.assembly(self.spec, self.dimensions)
-        return tuple(each if isinstance(each, Fitting) else Fitting(each) for each in said)
+    def height(self) -> float:
+        """Height of the cast bodies of the unit, mm."""
+        boxes = [mesh.bounds(self.mesh(body)) for body in self.unit if body.made == "cast"]
+        return max(box[5] for box in boxes) - min(box[2] for box in boxes)
 
     @property
     def plate(self) -> tuple[float, float]:
@@ -198,32 +224,11 @@ class MouldSet:
         top = plate_top(self.spec) if plinth else 0.0
         return top - self.spec.moulds.plate_mm, top
 
-    @property
-    def poured_across(self) -> tuple[str, float]:
-        """The widest open surface of a pour: its name, and its width, mm."""
-        return "cavity", 2 * self.dimensions.outer_radius
-
-    def greased(self, step: Step) -> str:
-        """Return the faces that get petroleum jelly before the cup of a pour is put on; "" for none.
-
-        A seal next to a tongue's passage is greased with the tongue.
-        """
-        if self.plan.concentric or not step.seals:
-            return ""
-        return (
-            f"the upright faces of the parts on the base, only inside the slots of cup {step.index} for them, "
-            "outside the cavity"
-        )
-
     def hung(self, step: Step) -> float:
         """Return how far a core under a pour's lid hangs into the cavity, mm; 0 without one."""
         lid = self.mesh(self.plan.tool(step.lid)) if step.lid else Manifold()
         cores = len(thick_parts(lid.slice(step.rim - FACETS))) > 1  # besides its skirt
         return step.rim - lid.bounding_box()[2] if cores else 0.0
-
-    def pieces(self, name: str) -> int:
-        """Return the number of solids that a body of that name is drawn of."""
-        return 1
 
     def meshes(self, shapes: Iterable[Shape]) -> list[Manifold]:
         """Return the meshes of shapes in the frame of the tools: the cells of a layer, seals, channels."""

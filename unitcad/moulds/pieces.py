@@ -40,7 +40,7 @@ def customary(standing: Sequence[Body], *, last: bool) -> Iterator[Removal]:
 
     `standing` are the tools of the pour. A piece without a way of its own stays. The peel itself is C310's.
     """
-    for kind in ("lid", "tongue", "cup", *(("filament",) if last else ())):
+    for kind in ("lid", "frame", "tongue", "cup", *(("filament",) if last else ())):
         for piece in standing:
             if piece.kind == kind and piece.removal:
                 yield Removal(piece.name, piece.removal)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
-from unitcad.designs.design import BEYOND, Cell, Layout, Tooling
+from unitcad.designs.design import BEYOND, Cell, Fitting, Layout, Tooling
 from unitcad.designs.dimensions import tool_dimensions
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import filament, lid
@@ -34,6 +34,7 @@ from unitcad.moulds.pieces import (
     tongue_pieces,
     tray_piece,
 )
+from unitcad.rooms import load, mould_makers
 from unitcad.shape import Shape, moved, turned, union
 from unitcad.shape.tree import Body, Kind
 from unitcad.spec import Spec, printer_of
@@ -50,7 +51,10 @@ class Step:
     `inserts` are motor and circuit of all cells, if they are laid in before this pour or an earlier one. `rim` is z of
     the plane that the blade runs on, `top` that of the silicone's open surface: the rim or the lid's upper face.
     `windows` counts the cup's passages for tongues that are closed all round; `groove`: it has an overflow groove.
-    `pins` centre the pour's lid on its base, if no cup does.
+    `pins` centre the pour's lid on its base, if no cup does. `greased`: the faces that get petroleum jelly before the
+    cup is put on, "" for none; a seal next to a tongue's passage is greased with the tongue.
+    `solids`: the number of solids that the product's body of this layer has.
+    `gated`: the cup is closed, and filled through a gate, the first of the channels.
     `removals` are the pieces taken away once the layer has cured, in that order; the others are part of the next pour.
     """
 
@@ -69,6 +73,9 @@ class Step:
     inserts: tuple[Body, ...] = ()
     pins: Pins | None = None
     removals: tuple[Removal, ...] = ()
+    greased: str = ""
+    solids: int = 1
+    gated: bool = False
 
     def __repr__(self) -> str:
         return f"Step({self.index}: {self.name}, {self.material or 'no material'}; {', '.join(self.tools)})"
@@ -80,8 +87,14 @@ class Step:
 
     @property
     def lid(self) -> str | None:
-        """The lid's name; None for an open pour."""
-        return f"lid{self.index}" if self.channels else None
+        """The lid's name; None for a pour without one."""
+        name = f"lid{self.index}"
+        return name if name in self.tools else None
+
+    @property
+    def injected(self) -> bool:
+        """Whether silicone is injected: under a lid, or into a closed cup."""
+        return bool(self.lid) or self.gated
 
 
 @dataclass(frozen=True)
@@ -94,6 +107,11 @@ class Plan:
     the through holes of a tool, by its name, if dimensions of rings don't define them.
     `stretches`: parts of the silicone that stretch after casting, and by how many percent, besides those of the tools.
     `splits`: the tools that are printed in pieces; everything but the pieces' files and C250 sees them joined.
+    The product: `makes` is its name. `laid_later` goes into the silicone after casting, `pushed_in` into a cast sheet
+    from its side towards the skin, each body named after its place. `assembly` says how; None: as the design does.
+    `widest`: name and width (mm) of the widest open surface of a pour; None: the unit. `across`: the length to measure.
+    `way`: how the body is turned and where its mould comes apart, in words; "" if cups lift off it as it is drawn.
+    `bench`: the module that words and draws the casting of such tools; "" for the core's.
     """
 
     tools: tuple[Body, ...]
@@ -107,6 +125,14 @@ class Plan:
     pry_slots: tuple[tuple[int, str, float], ...] = ()
     genus: tuple[tuple[str, int], ...] = ()
     splits: tuple[Split, ...] = ()
+    makes: str = "unit"
+    laid_later: tuple[Body, ...] = ()
+    pushed_in: tuple[Body, ...] = ()
+    assembly: tuple[Fitting, ...] | None = None
+    widest: tuple[str, float] | None = None
+    across: str = ""
+    way: str = ""
+    bench: str = ""
 
     def __repr__(self) -> str:
         pours = f"{len(self.steps)} {'pour' if len(self.steps) == 1 else 'pours'}"
@@ -157,7 +183,12 @@ def plan(spec: Spec) -> Plan:
     tongue whose width can't clear the air, a loose piece.
     """
     layers = cast_layers(spec)
-    made = _tooling(spec, layers)
+    return _planned(spec, layers, _tooling(spec, layers))
+
+
+def _planned(spec: Spec, layers: Sequence[Shape], made: Tooling) -> Plan:
+    """Return the plan of a tooling."""
+    layers = made.cast or layers
     dims, lay = made.dimensions, made.layout
     frame = Frame(spec, dims, lay)
     # Material variants share pieces: the label depends only on geometry.
@@ -181,16 +212,25 @@ def plan(spec: Spec) -> Plan:
             earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
             seals=made.seals[i],
             rim=dims.heights[i],
-            top=lid.lid_top(dims, i) if made.channels else dims.heights[i],
+            top=made.tops[i] if made.tops else lid.lid_top(dims, i) if made.channels else dims.heights[i],
             channels=made.channels[i] if made.channels else (),
+            gated=made.gated[i] if made.gated else False,
             windows=tails if dims.exit and dims.exit.high < dims.heights[i] else 0,
             groove=made.grooves[i] if made.grooves else True,
             inserts=laid if i + 1 >= laid_in else (),
             removals=tuple(customary(standing[i], last=i + 1 == len(layers))),
+            greased=_greased(i + 1) if made.seals[i] and not made.concentric else "",
         )
         for i, layer in enumerate(spec.layers)
     )
-    return Plan(tools, steps, lay, label, dims, made.concentric)
+    across = f"Farthest corner from the axis: {dims.outer_radius:.2f} mm."
+    return Plan(tools, steps, lay, label, dims, made.concentric, across=across, way=made.way, bench=made.bench)
+
+
+def _greased(pour: int) -> str:
+    """Return the faces to grease before the cup of a pour by complement is put on."""
+    parts = f"the upright faces of the parts on the base, only inside the slots of cup {pour} for them"
+    return f"{parts}, outside the cavity"
 
 
 def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
@@ -202,7 +242,7 @@ def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     if way == "concentric":
         return concentric(spec, cast)
     if way == "complement":
-        return complement(spec, cast)
+        return _complement(spec, cast)
     made = way(spec, cast)
     names, injected = [tool.name for tool in made.tools], spec.moulds.pour == "injected"
     needed = ["base", *(f"{kind}{i + 1}" for i in range(len(cast)) for kind in ("cup", "lid")[: 1 + injected])]
@@ -214,6 +254,19 @@ def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         wrong += [f"has {field} of {count} pours, not of {len(cast)}"] if count != len(cast) else []
     if wrong:
         raise UnitcadError(f"design {spec.design}: its tooling {wrong[0]}")
+    return made
+
+
+def _complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+    """Return moulds by complement, or those of a room that knows more ways. Raises Refusal."""
+    try:
+        made = complement(spec, cast)
+    except Refusal as refusal:
+        made = refusal
+    for reference in mould_makers():
+        made = load(reference)(spec, cast, made, lambda tooling: _planned(spec, cast, tooling))
+    if isinstance(made, Refusal):
+        raise made
     return made
 
 
@@ -243,7 +296,9 @@ def _engraved(tool: Body, frame: Frame, label: str) -> Body:
     """Return the tool with the set's label, and a cup with the numbers of its cells."""
     dims = frame.dims
     corners = label[:2], label[2:]
-    if tool.kind == "base":
+    if tool.kind == "base" and frame.lay.plate == frame.lay.cup:  # a tray: its plate has no free face
+        letters = corner_labels(frame, dims.heights[0], ("B", *corners))
+    elif tool.kind == "base":
         letters = base_label(frame, f"B{label}", plate_top(frame.spec))
     elif tool.kind == "cup" and tool.step:
         rim = dims.heights[tool.step - 1]

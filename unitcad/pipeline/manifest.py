@@ -1,28 +1,23 @@
-"""manifest.json: its tables, how a unit's is made, and the columns that a table of variants takes from it.
+"""manifest.json: its tables, and the columns that a table of variants takes from it. `make.py` makes it.
 
 A later version may add keys; those that are here keep their names.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
-from importlib.util import find_spec
+from collections.abc import Iterable, Mapping
 from typing import Any, NotRequired, TypedDict
 
-from unitcad import __version__, catalogue
-from unitcad.attenuation.edge.estimates import summary
+from unitcad import catalogue
 from unitcad.checks.finding import FindingRecord
-from unitcad.designs import design_of, no_estimate
-from unitcad.designs.design import Reason
-from unitcad.moulds.mould_set import MouldSet, shallow_grooves
-from unitcad.pipeline.plan import kernel_versions
-from unitcad.spec import Spec, spec_hash
-from unitcad.spec.raw import OUTPUTS
-from unitcad.validation import warnings
+from unitcad.spec import Spec
 
 CASTING = ("bom.csv", "casting.json", "casting.md", "troubleshooting.md")
+DRAWING = "drawing.pdf"
+PAGE = "report.html"
+"""The page of a folder, made on request and kept up by every later build into it."""
+BENCH = "bench.html"
+"""The bench page of a variant's procedure, next to the page."""
 UNCHECKED = "--no-check"
-NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
 NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
@@ -37,7 +32,7 @@ class BodyFile(TypedDict):
 class PartRecord(TypedDict):
     """A body of unit or tooling; `files` by format, `bbox_mm` the mesh's (x0, y0, z0, x1, y1, z1).
 
-    `solids`: their number, if more than one.
+    `solids`: their number, if more than one. `state`: how its file has a body that another file has stretched.
     """
 
     name: str
@@ -50,6 +45,7 @@ class PartRecord(TypedDict):
     triangles: int
     files: dict[str, BodyFile]
     solids: NotRequired[int]
+    state: NotRequired[str]
 
 
 class PourRecord(TypedDict):
@@ -80,23 +76,14 @@ class MeshFindings(TypedDict):
     findings: list[MeshFinding]
 
 
-class ModelLevel(TypedDict):
-    """A model's level at the edge, None if it gives no number, and its mean error against the measured levels."""
-
-    edge: float | None
-    table_error: float | None
-
-
 class EstimateSummary(TypedDict):
-    """The summary of the estimate; `measured` is the paper's level of this unit, None if there is none.
+    """The level at the edge with its 80 % range, the measurement of this unit, None if there is none, and the line."""
 
-    `lines` are the two that lead the estimate; `model` is the one behind the first.
-    """
-
-    models: dict[str, ModelLevel]
-    model: str | None
-    lines: list[str]
+    level: float | None
+    low: float | None
+    high: float | None
     measured: float | None
+    line: str
     frequency_hz: float | None
 
 
@@ -115,7 +102,7 @@ class FileRecord(TypedDict):
 
 
 class Manifest(TypedDict):
-    """A variant's manifest; `mould_checks` are the findings of the mould checks."""
+    """A result's manifest; `mould_checks` are the findings of the mould checks. A room's may have further keys."""
 
     name: str
     design: str
@@ -163,81 +150,6 @@ class Geometry(TypedDict):
     skipped: list[Skipped]
 
 
-def of_unit(
-    moulds: MouldSet,
-    only: Sequence[str],
-    check: bool,
-    shape: Geometry,
-    findings: list[FindingRecord],
-    estimate: dict[str, Any] | None,
-    pictures: list[str],
-) -> Manifest:
-    """Return a unit's manifest but for its files."""
-    spec = moulds.spec
-    return Manifest(
-        name=spec.name,
-        design=spec.design,
-        printer=spec.moulds.printer,
-        hash=spec_hash(spec)[:12],
-        outputs=list(only),
-        label=shape["label"],
-        warnings=[*warnings(spec), *(shallow_grooves(moulds) if "moulds" in only else [])],
-        air_ring_mm=shape["air_ring_mm"],
-        compensation={
-            "shrinkage_percent": spec.moulds.shrinkage_percent,
-            "bore_compensation_mm": spec.moulds.bore_compensation_mm,
-        },
-        mesh={
-            "kernel": "manifold3d",
-            "tolerance_mm": spec.output.tolerance_mm,
-            "segments": moulds.segments,
-            "note": "volume_mm3 and bbox_mm are the mesh's: its corners may exceed the surface by the tolerance",
-        },
-        parts=[
-            {
-                **part,
-                "material": spec.layers[(part["step"] or 0) - 1].material if part["made"] == "cast" else None,
-            }
-            for part in shape["parts"]
-        ],
-        steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
-        mould_checks=findings,
-        estimate=EstimateSummary(**summary(estimate)) if estimate else None,
-        check=count_findings(shape["check"]),
-        pictures=pictures,
-        casting=sorted(CASTING) if "casting" in only else None,
-        skipped=[Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)],
-        versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},
-        files={},
-    )
-
-
-def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
-    """Name the outputs that this variant lacks, and why."""
-    if not check or "moulds" not in only:
-        yield "mould checks", NO_MOULDS if check else UNCHECKED
-    if not check:
-        yield "mesh checks", UNCHECKED
-    design = design_of(spec)
-    if design.tooling == "concentric":
-        if len(spec.layers) == 1:
-            yield "second pour", "one layer: one pour"
-        if not spec.fpcb and not spec.wires:
-            yield "tongue and slot", "no FPCB"
-    yield from design.skipped(spec)
-    for name in OUTPUTS:
-        if name not in only:
-            # The page offers the command for outputs that were not asked for (report/app/estimate.js).
-            yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
-    if "step" not in spec.output.formats:
-        yield "boundary representation", "no STEP asked for" if _has_step_kernel() else NO_KERNEL
-
-
-@cache
-def _has_step_kernel() -> bool:
-    return find_spec("OCP") is not None
-
-
 def printed_mm3(parts: Iterable[PartRecord]) -> float:
     """Return the volume of all printed tools."""
     return sum(part["volume_mm3"] for part in parts if part["role"] == "tool" and part["made"] == "printed")
@@ -250,7 +162,7 @@ def count_findings(findings: list[MeshFinding]) -> MeshFindings:
 
 
 def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
-    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model.
+    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and the level at the edge.
 
     The manifest is that of the unit, or of an array of it.
     """
@@ -275,6 +187,12 @@ def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
     columns["mould_checks_passed"], columns["mould_checks"] = sum(finding["ok"] for finding in findings), len(findings)
     columns["mould_checks_failed"] = " ".join(sorted({finding["code"] for finding in findings if not finding["ok"]}))
     columns["check_errors"], columns["check_warnings"] = check["errors"], check["warnings"]
-    for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
-        columns[f"edge_{model}"] = level["edge"]
-    return columns
+    return columns | level_columns(manifest["estimate"])
+
+
+LEVEL_COLUMNS = ("level", "low", "high", "measured")
+
+
+def level_columns(level: Mapping[str, Any] | None) -> dict[str, float | None]:
+    """Return the columns of the level at the edge: its value, its 80 % range, the measurement of this unit."""
+    return {} if level is None else {f"edge_{key}": level[key] for key in LEVEL_COLUMNS}

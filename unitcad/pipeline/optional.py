@@ -18,10 +18,10 @@ _T = TypeVar("_T")
 
 
 class OptionalFiles:
-    """Makes the optional files of a result; `skipped` lists those that can't be made."""
+    """Makes the optional files of a result; `skipped`, which may be the result's own, lists those that can't be made."""
 
-    def __init__(self) -> None:
-        self.skipped: list[Skipped] = []
+    def __init__(self, skipped: list[Skipped] | None = None) -> None:
+        self.skipped: list[Skipped] = [] if skipped is None else skipped
 
     def made(self, path: str, make: Callable[[], _T]) -> _T | None:
         """Return the result of `make`; None, with an entry in `skipped`, if it fails.

@@ -23,10 +23,9 @@ from unitcad.casting.plates import SPARE_TONGUE, plates
 from unitcad.casting.preparation import slicer_settings
 from unitcad.casting.procedure_text import step_section
 from unitcad.casting.views import BenchPictures, picture_path
-from unitcad.designs import design_of, no_estimate
-from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
+from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError, WrongArgument, unknown_name
 from unitcad.export import glb, printing, svg
-from unitcad.export.printing import TooThin, print_ready
+from unitcad.export.printing import TooThin, print_ready, single_precision
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
 from unitcad.moulds.mould_set import MouldSet
@@ -132,14 +131,6 @@ def check_outputs(only: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in OUTPUTS if name in only)
 
 
-def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
-    """Return the outputs of `only` that the design has, such as no estimate. Raises Refusal if none is left."""
-    possible = tuple(name for name in only if name != "estimate" or design_of(spec).passes)
-    if not possible:
-        raise WrongArgument("only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
-    return possible
-
-
 # Inputs of a file:
 
 
@@ -215,16 +206,21 @@ def file_stem(body: Body) -> str:
 def ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh as it is written: its count of faces and both mesh formats come from one rounding.
 
+    A tool has its print attitude. A body of the unit has its place in the unit, so that files imported together fit.
+
     Raises Refusal, with the body's name, for a mesh that single precision can't represent.
     """
     try:
-        return _ready(body.shape, moulds.segments, body.upside_down)
+        return _ready(body.shape, moulds.segments, body.upside_down, body.role == "unit")
     except TooThin as error:
-        raise _refusal(moulds.spec, f"{body.name}: {error}") from None
+        raise _refusal(moulds.spec, f"{body.name}: {error}", tool=body.role == "tool") from None
 
 
-def _refusal(spec: Spec, why: str) -> Refusal:
-    """Return the refusal of a spec for a mesh that single precision can't represent."""
+def _refusal(spec: Spec, why: str, *, tool: bool = False) -> Refusal:
+    """Return the refusal of a spec for a mesh that no file can hold; `tool`: unitcad made it round the body."""
+    if is_custom(spec.design) and tool:
+        do = "the mould has no thickness there; move or round the body's edge there by 0.05 mm or more"
+        return Refusal("design", spec.design, f"{why}: {do}{UNIT_ALONE}")
     if is_custom(spec.design):
         do = "export the file again" if is_body_file(spec.design) else "draw them"
         return Refusal("design", spec.design, f"{why}; {do} so that parts overlap, or are 0.01 mm apart")
@@ -233,8 +229,9 @@ def _refusal(spec: Spec, why: str) -> Refusal:
 
 
 @lru_cache(maxsize=64)
-def _ready(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray, np.ndarray]:
-    return print_ready(*arrays(realise(shape, segments)), upside_down)
+def _ready(shape: Shape, segments: int, upside_down: bool, in_place: bool) -> tuple[np.ndarray, np.ndarray]:
+    mesh = arrays(realise(shape, segments))
+    return single_precision(*mesh) if in_place else print_ready(*mesh, upside_down)
 
 
 def forget() -> None:

@@ -50,6 +50,14 @@ def moments(moulds: MouldSet) -> Iterator[Moment]:
     inserts: tuple[str, ...] = ()
     for step in plan.steps:
         pour, cup = f"Pour {step.index}", step.cup
+        if plan.bench:
+            closed = tuple(tool.name for kind in ("cup", "frame") for tool in plan.standing(step, kind))
+            if closed:
+                yield Moment(f"{pour}: the mould closed", (*base, *closed))
+            yield Moment(f"{pour}: filled", (*base, *closed, step.name))
+            if closed:
+                yield Moment(f"{pour}: cured, opened", (*base, step.name))
+            continue
         before, inserts = inserts, tuple(body.name for body in step.inserts)
         cured = (*base, *(f"layer{i}" for i in range(1, step.index)), *inserts)
         tongues = tuple(tool.name for tool in plan.standing(step, "tongue"))
@@ -87,7 +95,14 @@ def exploded_moves(moulds: MouldSet) -> dict[str, Offset]:
         inserts = [body.name for body in step.inserts if body.name not in offsets]
         if inserts:
             lift(*inserts)
-        lift(step.cup)
+        cups = plan.standing(step, "cup")
+        for cup in cups if len(cups) == 1 else ():
+            lift(cup.name)
+        for cup in cups if len(cups) > 1 else ():
+            dx, dy, _ = cup.removal or (0.0, 0.0, 0.0)
+            offsets[cup.name] = dx * ASIDE, dy * ASIDE, 0.0
+        if len(cups) > 1:
+            top = max(top, _extent(moulds, [cup.name for cup in cups])[1])
         lift(step.name)
     for tool in plan.tools:
         if tool.kind == "tongue" and tool.removal:

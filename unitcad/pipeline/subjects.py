@@ -1,71 +1,49 @@
-"""Subjects of a build. A unit is one; rooms define those of several units.
-
-A room names its `Compound` in the `FileKind` of its files. Its loaded object names it too, as the attribute `subject`.
-"""
+"""Loaders: from a template's name, a file, plain data or a loaded object to the subject of a result."""
 
 from __future__ import annotations
 
-import json
-from abc import abstractmethod
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from unitcad.errors import Refusal
+from unitcad.documents import parse_json, read_toml
+from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.make import Subject
-from unitcad.pipeline.manifest import Manifest
-from unitcad.rooms import load
+from unitcad.pipeline.subject import Compound, Subject
+from unitcad.pipeline.unit import Unit
+from unitcad.rooms import FileKind, file_kinds, load
 from unitcad.spec import Spec, from_json
-from unitcad.validation import compound_kind, from_data
+from unitcad.validation import compound_kind, every_template, from_data
 from unitcad.validation import load as load_spec
-from unitcad.validation.plain_data import Changes, Source
+from unitcad.validation.load import spell_path
+from unitcad.validation.plain_data import Changes, Source, changes_of
+from unitcad.validation.suggestions import numbers
 
 
-class Compound(Subject):
-    """A subject of several units, such as an array."""
-
-    @classmethod
-    @abstractmethod
-    def load(cls, source: Any, changes: Changes = ()) -> Self:
-        """Load it from a template's name, a file, plain data or the loaded object. Raises Refusal or UnitcadError."""
-
-    @classmethod
-    @abstractmethod
-    def of_data(cls, data: Mapping[str, Any]) -> Self:
-        """Make it of plain data with whole specs of its units. Raises Refusal."""
-
-    @classmethod
-    @abstractmethod
-    def read(cls, path: Path) -> dict[str, Any]:
-        """Read a file as plain data with whole specs of its units. Raises Refusal or UnitcadError."""
-
-    @staticmethod
-    @abstractmethod
-    def offered(refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        """Return the refusal of plain data with a nearest value that was tried and accepted."""
-
-    @staticmethod
-    @abstractmethod
-    def write_page(folder: Path, warn: Callable[[str], None]) -> Path:
-        """Write the page of a result's folder. Returns its path."""
-
-    @staticmethod
-    @abstractmethod
-    def estimate(names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool) -> None:
-        """Print the estimate of one or several. `hertz`: the drive's frequency; None: the motor's. Raises Refusal."""
-
-    @abstractmethod
-    def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
-        """Yield the lines that a person reads at the end of a build, from the result's folder and manifest.
-
-        A length that is `given`, by its path, counts as measured.
-        """
+def compound(kind: FileKind) -> type[Compound]:
+    """Return the class of a kind of file that describes several units."""
+    return load(kind.subject)
 
 
-def subject(of: Any) -> Subject:
-    """Return a spec, or the loaded object of a room, as the subject of a result."""
-    return Subject(of) if isinstance(of, Spec) else load(of.subject)(of)
+def subject(of: object) -> Subject:
+    """Return a spec, the loaded object of a room, or a subject itself, as the subject of a result."""
+    if isinstance(of, Subject):
+        return of
+    if isinstance(of, Spec):
+        return Unit(of)
+    found = _made_of(of)
+    if found is None:
+        raise UnitcadError(f"{type(of).__name__} is nothing to build: give a Spec or an array")
+    return found(of)
+
+
+def _made_of(of: object) -> type[Compound] | None:
+    """Return the class for the loaded object of a room; None for any other, without a look at the rooms."""
+    if isinstance(of, str | os.PathLike | Mapping | Spec | MouldSet):
+        return None
+    known = (compound(kind) for kind in file_kinds() if kind.subject)
+    return next((one for one in known if isinstance(of, one.of)), None)
 
 
 def load_subject(source: Source | Any, changes: Changes = (), only: Sequence[str] = ()) -> Subject:
@@ -74,20 +52,35 @@ def load_subject(source: Source | Any, changes: Changes = (), only: Sequence[str
     Raises Refusal or UnitcadError, also for a unit without moulds if `only` names an output that needs them.
     """
     kind = compound_kind(source)
-    named = kind.subject if kind else getattr(source, "subject", None)
-    if named:
-        return load(named).load(source, changes)
-    moulded = {"moulds", "casting"} & set(only)
-    return Subject(load_spec(source, changes, makeable=(lambda spec: MouldSet(spec).plan) if moulded else None))
+    if found := compound(kind) if kind else _made_of(source):
+        made: Subject = found.load(source, changes)
+    else:
+        moulded = {"moulds", "casting"} & set(only)
+        made = Unit(load_spec(source, changes, makeable=(lambda spec: MouldSet(spec).plan) if moulded else None))
+    made.given = _given(source, changes)
+    return made
+
+
+def _given(source: object, changes: Changes) -> frozenset[str]:
+    """Return the paths of the numbers that a person gave, by a change or in data or a file of their own.
+
+    Templates and the files of results do not count.
+    """
+    own: Mapping[str, Any] = source if isinstance(source, Mapping) else {}
+    if isinstance(source, str | os.PathLike):
+        text = spell_path(os.fspath(source), every_template())
+        shipped = text in every_template() or (Path(text).parent / "manifest.json").exists()
+        own = {} if shipped else read_toml(Path(text))
+    return frozenset({*changes_of(changes), *(path for path, _ in numbers(own))})
 
 
 def subject_of_data(data: Mapping[str, Any]) -> Subject:
     """Return the subject of plain data. Raises Refusal."""
     kind = compound_kind(data)
-    return load(kind.subject).of_data(data) if kind else Subject(from_data(dict(data), Path()))
+    return compound(kind).of_data(data) if kind else Unit(from_data(dict(data), Path()))
 
 
 def subject_of_text(text: str) -> Subject:
     """Return the subject of `Subject.text`."""
-    data = json.loads(text)
-    return subject_of_data(data) if compound_kind(data) else Subject(from_json(text))
+    data = parse_json(text, "the subject")
+    return subject_of_data(data) if compound_kind(data) else Unit(from_json(text))

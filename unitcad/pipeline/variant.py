@@ -27,10 +27,10 @@ class Variant(MouldSet):
     ----------
     spec : Spec
         The spec; ``Variant.of`` takes a template's name or a file.
-    altered : Plan, optional
-        A plan in place of the spec's own, for tests with a fault.
     given : frozenset of str, optional
         Paths of the lengths that a person gave, such as "motor.thickness_mm"; the procedure asks to measure the others.
+    origin : Origin, optional
+        What rooms cast in place of a unit, such as the sheet of an array. Default: the unit of the spec.
 
     Attributes
     ----------

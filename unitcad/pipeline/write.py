@@ -12,24 +12,21 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from unitcad import cache, files
 from unitcad.cache import MemoryStore, MissingContent, Store, digest
+from unitcad.documents import read_json, read_toml
 from unitcad.errors import UnitcadError
 from unitcad.json_text import json_bytes
-from unitcad.pipeline.make import Product, Progress, Subject
+from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import check_outputs, code_version
+from unitcad.pipeline.result import Product, Progress
+from unitcad.pipeline.subject import Subject
 from unitcad.pipeline.subjects import subject, subject_of_data
-from unitcad.spec import read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
 
 LOCK = re.compile(r"\.[a-z0-9.-]+-[0-9a-f]{12}\.lock")
-PAGE = "report.html"
-"""The page of a folder, made on request and kept up by every later build into it."""
-BENCH = "bench.html"
-"""The bench page of a variant's procedure, next to the page."""
 TRIES = 5
 """How often a result is made when content that it shares vanishes from the cache meanwhile."""
 
@@ -53,19 +50,18 @@ class _Changed(Exception):
 
 
 def build(
-    of: Any,
+    of: object,
     out: Path = Path("out"),
     *,
     only: Sequence[str] = OUTPUTS,
     check: bool = True,
     say: Callable[[str], object] = lambda stage: None,
     store: Store | None = None,
-    given: frozenset[str] = frozenset(),
 ) -> Built:
-    """Build a spec, or the loaded object of a room, into `out`/<slug>-<hash12>.
+    """Build a spec, the loaded object of a room, or a subject into `out`/<slug>-<hash12>.
 
     `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are skipped. Formats and outputs that
-    the folder has from before are made again. `say` gets the name of each stage. `given`: see `Subject`.
+    the folder has from before are made again. `say` gets the name of each stage.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
     wanted = subject(of)
@@ -79,9 +75,7 @@ def build(
         formats: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
         every, checked = check_outputs((*outputs, *there.outputs)), check or there.checked
         with contextlib.suppress(_Changed):  # another build has put a result there: its outputs are made too
-            making = wanted.with_formats(formats)
-            making.given = given
-            maker = partial(making.make, every, checked)
+            maker = partial(make, wanted.with_formats(formats), every, checked)
             return write(folder, maker, store, say, unchanged=lambda there=there: earlier(folder, wanted) == there)
 
 
@@ -159,7 +153,7 @@ def earlier(folder: Path, wanted: Subject) -> Earlier:
     """Return the manifest of an existing folder. Raises UnitcadError if it is no result of this spec."""
     formats = earlier_formats(folder, wanted)
     try:
-        manifest = files.read_json(folder / "manifest.json", links=False)
+        manifest = read_json(folder / "manifest.json", links=False)
         outputs = tuple(name for name in manifest["outputs"] if isinstance(name, str))
         return Earlier(formats, outputs, all(entry["reason"] != UNCHECKED for entry in manifest["skipped"]))
     except (UnitcadError, KeyError, TypeError):
@@ -173,7 +167,7 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
     link counts as absent.
     """
     try:
-        manifest = files.read_json(folder / "manifest.json", links=False)
+        manifest = read_json(folder / "manifest.json", links=False)
         if any((folder / parent).is_symlink() for parent in {Path(path).parent for path in manifest["files"]}):
             return None
         for path, listed in manifest["files"].items():

@@ -14,9 +14,9 @@ from unitcad import __version__, files
 from unitcad.casting.cast_record import ENDING, FORMAT, HASH_DIGITS
 from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
+from unitcad.documents import read_json
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.write import BENCH
+from unitcad.pipeline.manifest import BENCH, Manifest
 from unitcad.report.html_page import html_page
 from unitcad.report.read_results import expect, spec_in, step_pictures
 from unitcad.spec import Spec, spec_hash, to_data
@@ -31,7 +31,7 @@ def write_bench(folder: Path) -> Path | None:
     Raises UnitcadError if casting.json is damaged.
     """
     try:
-        data = files.read_json(folder / "casting.json", links=False)
+        data = read_json(folder / "casting.json", links=False)
     except files.NotThere:
         return None
     expect(data, Procedure, folder / "casting.json")
@@ -73,7 +73,7 @@ def _expected_measures(casting: Procedure, spec: Spec | None) -> dict[str, Any]:
 
 
 def _hash(folder: Path) -> str:
-    manifest = files.read_json(folder / "manifest.json", links=False)
+    manifest = read_json(folder / "manifest.json", links=False)
     expect(manifest, Manifest, folder / "manifest.json")
     return str(manifest["hash"])
 

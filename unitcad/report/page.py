@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -10,18 +9,19 @@ from typing import Any
 from msgspec import structs
 
 from unitcad import __version__
+from unitcad.documents import parse_toml
 from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.manifest import BENCH, PAGE
 from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
-from unitcad.pipeline.write import BENCH, PAGE
+from unitcad.pipeline.subjects import compound
 from unitcad.report import read_results
 from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import Pool, asset, compress, html_page
 from unitcad.report.read_results import VariantRecord
-from unitcad.rooms import load
 from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
@@ -76,7 +76,7 @@ def write_report(
             if unit.is_dir() and not unit.is_symlink() and read_results.is_variant(unit):
                 write_report(unit, warn)
         _write_bench(folder, warn)
-        return load(kind.subject).write_page(folder, warn)
+        return compound(kind).write_page(folder, warn)
     if folder.is_dir() and read_results.is_variant(folder):
         _write_bench(folder, warn)
     data, title, damage = page_data(folder, modelled)
@@ -141,7 +141,7 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
         "version": __version__,
         "variants": [[record.folder, pool.put(record.as_dict())] for record in records],
         "table": structs.asdict(table) if table else None,
-        "estimate": _of_all(batch, records),
+        "estimate": (batch or {}).get("estimate"),
         "batch": {key: value for key, value in batch.items() if key != "variants"} if batch else None,
         "damaged": sorted(damaged.items()),
         "pool": pool.entries,
@@ -149,30 +149,6 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
     }
     partly = {record.folder or folder.name: record.damaged for record in records if record.damaged}
     return data, title, damaged | {name: whys[0] for name, whys in partly.items()}
-
-
-def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[str, Any]:
-    """Return data on the levels of all variants: typical error by model, and swept keys that it does not read.
-
-    As batch.json has them; a folder without one has the errors of the first estimate.
-    """
-    if batch and batch.get("estimate"):
-        return batch["estimate"]
-    for record in records:
-        table = (record.estimate or {}).get("table_error")
-        if isinstance(table, dict):
-            found = {name: _typical(table.get(name)) for name in table}
-            return {"typical_error": {name: one for name, one in found.items() if one}, "insensitive": {}}
-    return {"typical_error": {}, "insensitive": {}}
-
-
-def _typical(scores: Any) -> float | None:
-    """Return a model's leave-one-out error from its scores in an estimate; None for anything else."""
-    try:
-        typical = scores["leave_one_out"]["levels"]["geometric_mean"]
-    except (KeyError, TypeError):
-        return None
-    return typical if isinstance(typical, float) else None
 
 
 def _models(records: list[VariantRecord], specs: Iterable[Spec | None], modelled: Modelled) -> dict[str, Any]:
@@ -199,4 +175,4 @@ def page(data: dict[str, Any], title: str) -> str:
 
 def vendored() -> dict[str, dict[str, Any]]:
     """Return the libraries that every page carries, by name: version, licence, files, how they were made."""
-    return tomllib.loads(asset("vendor/versions.toml"))
+    return parse_toml(asset("vendor/versions.toml"), "versions.toml")

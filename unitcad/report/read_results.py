@@ -18,19 +18,17 @@ from msgspec import UNSET, Struct, UnsetType, structs
 
 from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
+from unitcad.documents import read_json, read_toml
 from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.files import TEMPORARY
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.manifest import PAGE, Manifest, level_columns
 from unitcad.pipeline.plan import GEOMETRIC, build_key
-from unitcad.pipeline.write import PAGE
 from unitcad.report.html_page import REFERENCE
 from unitcad.rooms import FileKind, file_kinds
-from unitcad.spec import Spec, read_toml, to_data, with_formats
+from unitcad.spec import Spec, to_data, with_formats
 from unitcad.validation import from_data
 
-DEEPEST = 40
-"""Nesting of lists and tables that a result's file may have."""
 LARGEST_PICTURE = 1_000_000
 """Bytes of a step's picture, at most."""
 MOST_PICTURES = 500
@@ -44,13 +42,12 @@ class ListedVariant(Struct):
 
 
 class SweptLevels(Struct):
-    """Each model's typical error in a batch, a factor, and the swept keys that it does not read.
+    """The swept keys that the level at the edge does not read.
 
-    `not_measured`: swept lengths with the one value, mm, that every measured unit had; earlier batches have none.
+    `not_measured`: swept lengths with the one value, mm, that every measured unit had.
     """
 
-    typical_error: dict[str, float]
-    insensitive: dict[str, list[str]]
+    unread: list[str]
     not_measured: dict[str, float] = {}
 
 
@@ -100,17 +97,15 @@ class ResultsTable(Struct, frozen=True):
 
 
 def expect(data: Any, kind: Any, path: Path) -> None:
-    """Raise UnitcadError, naming file and place, for data of another kind, too deep, or with the page's own key."""
+    """Raise UnitcadError, naming file and place, for data of another kind, or with the page's own key."""
     level = [data]
-    for _ in range(DEEPEST):
+    while level:
         tables = [node for node in level if isinstance(node, dict)]
         if any(REFERENCE in table for table in tables):
             raise UnitcadError(f"{path}: is not a result of unitcad: a key of it is a NUL")
         level = [item for table in tables for item in table.values()] + [
             item for node in level if isinstance(node, list) for item in node
         ]
-    if level:
-        raise UnitcadError(f"{path}: is not a result of unitcad: nested deeper than {DEEPEST}")
     try:
         msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
@@ -123,7 +118,7 @@ JSON, CSV = BATCH_TABLES = ("batch.json", "variants.csv")
 def read_batch(folder: Path) -> dict[str, Any] | None:
     """Read the table of a batch's folder; None without one. Raises UnitcadError if it can't be read."""
     try:
-        batch = files.read_json(folder / JSON, largest=files.LARGEST_TABLE, links=False)
+        batch = read_json(folder / JSON, largest=files.LARGEST_TABLE, links=False)
     except files.NotThere:
         return None
     expect(batch, BatchFile, folder / JSON)
@@ -171,7 +166,7 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
 
     Raises UnitcadError for a manifest that can't be read.
     """
-    manifest = files.read_json(folder / MANIFEST, links=False)
+    manifest = read_json(folder / MANIFEST, links=False)
     expect(manifest, Manifest, folder / MANIFEST)
     where = folder.relative_to(root).as_posix()
     damage: list[str] = []
@@ -321,8 +316,7 @@ def _row(record: VariantRecord) -> dict[str, Any]:
     for i, layer in enumerate(spec.get("layers", [])):
         row |= {f"layers.{i}.{key}": value for key, value in layer.items()}
     row |= {f"{part['name']}_mm3": part["volume_mm3"] for part in manifest["parts"] if part["made"] == "cast"}
-    for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
-        row[f"edge_{model}"] = level["edge"]
+    row |= level_columns(manifest["estimate"])
     checks = manifest["mould_checks"]
     row["mould_checks"] = ("hold" if all(check["ok"] for check in checks) else "broken") if checks else None
     row["warnings"] = len(manifest["warnings"])
@@ -338,7 +332,7 @@ def _cell(value: Any) -> Any:
 
 def read_table(path: Path) -> dict[str, Any]:
     """Read a JSON file with a table."""
-    data = files.read_json(path, links=False)
+    data = read_json(path, links=False)
     expect(data, dict[str, Any], path)
     return data
 

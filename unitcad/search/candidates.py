@@ -235,8 +235,8 @@ def silicones_of(target: Target, frequency: Quantity) -> tuple[dict[str, Silicon
             skipped[name] = f"it can't be cast: no source gives its {join_words(lacks)}"
             continue
         layer = silicone_layer(entries[name], 1e-3, frequency, target.asked.estimate.moduli == "quasi-static")
-        if layer.youngs_modulus.value is None:
-            skipped[name] = layer.youngs_modulus.note
+        if math.isnan(layer.place):
+            skipped[name] = "no modulus is known"
         else:
             known[name] = layer
     if not known:
@@ -296,7 +296,7 @@ def tabulate(
             parts.append((*columns, lead.predictive(units, of)))
         start += len(own)
     geometry, sequence, mass, new = (np.concatenate([part[i] for part in parts]) for i in range(4))
-    ends = ("centre", "below", "above")
+    ends = ("centre", "scale")
     predictive = replace(
         parts[0][4], **{end: np.concatenate([getattr(part[4], end) for part in parts]) for end in ends}
     )
@@ -338,11 +338,12 @@ def _units(
     variants = [one.variant for one in made]
     base, each, count = stack_inputs(variants), nearest.lengths(variants), len(own)
     of_silicones = {key: [[getattr(layer, key).middle for layer in one] for one in own] for key in FIELDS}
-    of_silicones["density"] = [[layer.density for layer in one] for one in own]
+    for key in ("density", "place", "doubt"):
+        of_silicones[key] = [[getattr(layer, key) for layer in one] for one in own]
     units = replace(
         base,
         **{key: np.tile(values, (len(made), 1)) for key, values in of_silicones.items()},
-        **{key: np.repeat(getattr(base, key), count, axis=0) for key in ("thickness", "omega", "passes", "whole")},
+        **{key: np.repeat(getattr(base, key), count, axis=0) for key in ("thickness", "omega", "passes")},
     )
     of = nearest.Lengths(*(np.repeat(part, count, axis=0) for part in vars(each).values()))
     shapes = [one.geometry for one in variants]

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.output import console, print_indented, print_json, progress
+from unitcad.cli.output import print_indented, print_json, progress
 from unitcad.cli.shared_options import AsJson, Out
+from unitcad.cli.tables import console
 from unitcad.files import path_seen_from
 from unitcad.search import design_files
 from unitcad.search.proposals import invert

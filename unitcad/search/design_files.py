@@ -22,7 +22,7 @@ from unitcad.report.html_page import drawing, plain_page
 from unitcad.search.candidates import Say, limits
 from unitcad.search.proposals import Inversion, name_of, order_rows
 from unitcad.spec import to_toml
-from unitcad.text import cell, join_words, number, some
+from unitcad.text import cell, number, some
 
 _GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
@@ -91,16 +91,13 @@ def title(one: Mapping[str, Any]) -> str:
 
 
 def level_line(one: Mapping[str, Any]) -> str:
-    """Return a proposal's measurement and by whom, if there is one, then its probability and range."""
-    first, edge = "", one["edge"]
+    """Return the line of a proposal's level, its probability, and whether its measurement meets the target."""
+    meets = ""
     if measured := one["measured"]:
         level, second = percent(measured["level"]), measured.get("also")
         also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
-        first = f"measured {level} ({measured['by']}{also}): meets the target; "
-    return (
-        f"{first}probability {one['probability']:.2f}, {percent(edge['p10'])} to {percent(edge['p90'])} "
-        "at the edge (10 to 90 %)"
-    )
+        meets = f" The measurement ({level}{also}, {measured['by']}) meets the target."
+    return f"{one['edge']['line']} Probability of meeting the target: {one['probability']:.2f}.{meets}"
 
 
 def lines(one: Mapping[str, Any]) -> list[str]:
@@ -117,19 +114,19 @@ def lines(one: Mapping[str, Any]) -> list[str]:
         )
     if crosstalk := one.get("crosstalk"):
         value, low, high = (number(crosstalk[key], 2) for key in ("value", "low", "high"))
+        at = crosstalk["neighbour"]
         made.append(
             f"crosstalk ratio {value} ({low} to {high}) at {number(crosstalk['pitch_mm'], 4)} mm, the same for every "
-            f"unit of this diameter; {percent(crosstalk['neighbour'])} of the motor's amplitude at the neighbour"
+            "unit of this diameter"
+            + ("" if at is None else f"; {percent(at)} of the motor's amplitude at the neighbour")
         )
-    if one["relies_on"]:
-        made.append(f"the nearest measured unit differs in {join_words(one['relies_on'])}")
     return [*made, one["lengths_gain"], *one["remarks"]]
 
 
 SPECS = "specs"
 _COLUMNS = (
     "place", "proposal", "name", "design", "motor", "materials", "walls_mm", "caps_mm", "diameter_mm", "height_mm",
-    "mass_g", "cure_hours", "crosstalk_ratio", "probability", "edge_p10", "edge_p50", "edge_p90", "measured", "over",
+    "mass_g", "cure_hours", "crosstalk_ratio", "probability", "edge_low", "edge_level", "edge_high", "measured", "over",
 )  # fmt: skip
 _NUMBER = ' class="number"'
 
@@ -231,13 +228,13 @@ def html_page(data: Mapping[str, Any], sections: Sequence[str]) -> str:
 
 
 def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
-    rows, head = [], ("unit", "measured", "probability", "10 to 90 %", "g", "hours", "mm")
+    rows, head = [], ("unit", "measured", "probability", "80 % range", "g", "hours", "mm")
     for one in proposals:
         edge, measured = one["edge"], one["measured"]
         cells = [
             percent(measured["level"]) if measured else "",
             f"{one['probability']:.2f}",
-            f"{percent(edge['p10'])} to {percent(edge['p90'])}",
+            "" if edge["low"] is None else f"{percent(edge['low'])} to {percent(edge['high'])}",
             number(one["mass_g"], 2),
             number(one["cure_hours"], 3),
             f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",

@@ -11,14 +11,16 @@ import numpy as np
 from msgspec import structs
 
 from unitcad.attenuation.curve import crosstalk_ratio
-from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.measured import measured_block, nearest
+from unitcad.attenuation.edge.answer import answer
+from unitcad.attenuation.edge.measured import measured_block
 from unitcad.attenuation.edge.ranges import lead_of, own_block
+from unitcad.attenuation.edge.words import first_line
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
+from unitcad.json_text import rounded
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.candidates import (
     Candidates,
@@ -125,8 +127,8 @@ _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
 RANKS = "design and which side is soft"
 NOT_RANKED = (
-    "walls, caps, diameter, frequency, or silicones with the same side soft, except by an assumed line below a ratio "
-    "of 16.7"
+    "walls, caps, diameter, frequency, or silicones with the same side soft, except by an assumed line between equal "
+    "silicones and the measured pairs"
 )
 """The measured units do not tell these apart: another value only widens the range."""
 
@@ -226,8 +228,7 @@ def castability(spec: Spec) -> tuple[int, list[str]]:
 def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None) -> dict[str, Any]:
     """Return a candidate as data: its kind, its probability and range, its measurement, unmeasured inputs."""
     variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
-    low, middle, high = (float(end[row]) for end in found.range)
-    measured = measurement(found.target, variant)
+    one, measured = answer(variant, found.target.fit), measurement(found.target, variant)
     data: dict[str, Any] = {
         "name": spec.name,
         "label": label(found, row),
@@ -239,14 +240,14 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "measured": measured,
         "probability": float(found.probability[row]),
         "group": kind.group,
-        "edge": {"p10": low, "p50": middle, "p90": high},
+        "edge": {"level": one.level, "low": one.low, "high": one.high, "line": first_line(one)},
         "diameter_mm": float(found.diameter_mm[row]),
         "height_mm": float(found.height_mm[row]),
         "mass_g": float(found.mass_g[row]),
         "cure_hours": float(found.cure_hours[row]),
         "checks": checked,
         "lengths_measured": not found.novelty[row],
-        "relies_on": nearest(variant)["differs_in"],
+        "relies_on": list(one.wider),
         "lengths_gain": _gain(kind),
         "remarks": warnings(spec),
     }
@@ -257,7 +258,7 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
             "low": ratio.low,
             "high": ratio.high,
             "pitch_mm": goals.pitch_mm,
-            "neighbour": (ratio.value or ratio.middle) * middle,
+            "neighbour": None if one.level is None else (ratio.value or ratio.middle) * one.level,
         }
         if goals.crosstalk_ratio_max is not None and (ratio.high or 0.0) > goals.crosstalk_ratio_max:
             data["remarks"].append(

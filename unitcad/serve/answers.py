@@ -13,21 +13,23 @@ from importlib import import_module
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
+from unitcad.documents import parse_toml
 from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
+from unitcad.json_text import parse_message
 from unitcad.serve import unit_answers
 from unitcad.serve.form import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
 from unitcad.serve.remedies import add_remedies
-from unitcad.spec import parse_toml
 from unitcad.validation import compound_kind
 
 
 def respond(message: bytes, trusted: bytes) -> bytes:
     """Return the answer to an `Ask`, both as JSON; `trusted` is a `Trusted` as JSON."""
     begun = time.process_time()
-    ask = msgspec.json.decode(message, type=Ask)
-    answer = answered(ask, msgspec.json.decode(trusted, type=Trusted))
+    ask = parse_message(message, Ask)
+    answer = answered(ask, parse_message(trusted, Trusted))
     answer.processor_ms = round(1e3 * (time.process_time() - begun), 1)
     return msgspec.json.encode(answer)
 
@@ -49,7 +51,8 @@ def _answered(ask: Ask, trusted: Trusted) -> Answer:
         data = parse_toml(text, "the text")
     except UnitcadError as error:
         place = re.match(r"the text:(\d+):", str(error))  # the line that tomllib's message names
-        return Answer(text=text, faults=[Fault(str(error), line=int(place[1]) if place else None)])
+        fault = _fault(error)
+        return Answer(text=text, faults=[replace(fault, line=int(place[1])) if place else fault])
     answer = Answer(text=text, layers=len(data["layers"]) if isinstance(data.get("layers"), list) else 0)
     kind = answers_about(data)
     subject: Any = None
@@ -88,7 +91,7 @@ def resolve(text: bytes, trusted: bytes) -> bytes:
     try:
         data = parse_toml(text.decode(), "the text")
         kind = answers_about(data)
-        known = msgspec.json.decode(trusted, type=Trusted)
+        known = parse_message(trusted, Trusted)
         subject: Any = kind.settled(data, known)
         asked, code = kind.asked_toml(text.decode(), data, subject, known), kind.has_code(subject)
     except UnitcadError as error:

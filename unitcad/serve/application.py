@@ -16,8 +16,10 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from unitcad.documents import parse_json
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
+from unitcad.json_text import parse_message
 from unitcad.report.page import page_data
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
@@ -159,7 +161,7 @@ class Live:
                 "unit", "unitcad.serve.answers:resolve", text.encode("utf-8", "replace"), self.questions.trusted,
                 seconds=10.0,
             )  # fmt: skip
-        given = msgspec.json.decode(content)
+        given = parse_json(content, "the answer")
         if "refused" in given:
             raise UnitcadError(given["refused"])
         return given, ["--allow-code"] if given["code"] else []
@@ -209,8 +211,8 @@ def _post(path: str, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> 
         if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
             return PlainTextResponse("messages are application/json\n", 415)
         try:
-            message = msgspec.json.decode(await request.body(), type=kind)
-        except (msgspec.DecodeError, RecursionError) as error:
+            message = parse_message(await request.body(), kind)
+        except UnitcadError as error:
             return PlainTextResponse(f"not a message that this page sends: {error}\n", 400)
         try:
             return _json(await handle(message))

@@ -10,14 +10,14 @@ from typing import Any, Literal
 import msgspec
 import tomlkit
 from msgspec.structs import replace
-from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, InlineTable
 
 from unitcad.catalogue import Material, materials, motors, printers, tissue
 from unitcad.designs import shipped
+from unitcad.documents import editable_toml, parse_value
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit, Field, Group
-from unitcad.spec import MOTOR_SIZES, Spec, parse_toml, to_data
+from unitcad.spec import MOTOR_SIZES, Spec, to_data
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, meaning, notes, title_of
 from unitcad.spec.raw import (
     CastingTable,
@@ -226,11 +226,7 @@ def edited(text: str, edits: Sequence[Edit]) -> str:
     """
     if not edits:
         return text
-    try:
-        document = tomlkit.parse(text)
-    except (TOMLKitError, RecursionError, ValueError):
-        parse_toml(text, "the text")  # whose words the page shows without an edit too
-        raise UnitcadError("the text: has TOML that can't be edited value by value; change the text") from None
+    document = editable_toml(text, "the text")
     for edit in edits:
         _apply(document, edit)
     return tomlkit.dumps(document)
@@ -283,8 +279,8 @@ def _value(edit: Edit) -> Any:
     if not edit.toml:
         return edit.value
     try:
-        return tomlkit.value(str(edit.value))
-    except (TOMLKitError, RecursionError, ValueError):
+        return parse_value(str(edit.value))
+    except UnitcadError:
         raise Refusal(edit.path, edit.value, "is no TOML value; a list is [2, 3], a word in quotes") from None
 
 

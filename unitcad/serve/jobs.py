@@ -12,11 +12,12 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from itertools import count
 from pathlib import Path
 
+from unitcad.cli.output import STAGES
 from unitcad.errors import UnitcadError
 from unitcad.files import scratch
 from unitcad.serve.messages import JobState
 from unitcad.serve.request_guard import AccessKeys
-from unitcad.workers import STAGES, Call, Pool, run_here
+from unitcad.workers import Call, Pool, run_here
 
 MOST_KEPT = 20
 STAGE = "stage: "

@@ -6,8 +6,6 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 
-from unitcad.spec.convert import DEEPEST
-
 LARGEST_TEXT = 1_000_000
 """Characters of a spec that the page may send."""
 Text = Annotated[str, Meta(max_length=LARGEST_TEXT)]
@@ -33,14 +31,14 @@ class Edit(Message, frozen=True, kw_only=True):
     toml: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse values that TOML lacks, which msgspec reports as a fault of the message."""
-        if not (self.remove and self.value is None) and not _is_toml(self.value, DEEPEST):
-            raise ValueError(f"an edit's value has no null and nests at most {DEEPEST} deep")
+        """Refuse a null, which TOML lacks; msgspec reports it as a fault of the message."""
+        if not (self.remove and self.value is None) and _has_null(self.value):
+            raise ValueError("an edit's value has no null")
 
 
-def _is_toml(value: Any, deepest: int) -> bool:
+def _has_null(value: Any) -> bool:
     inside = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    return value is not None and deepest >= 0 and all(_is_toml(each, deepest - 1) for each in inside)
+    return value is None or any(map(_has_null, inside))
 
 
 class Ask(Message, frozen=True, kw_only=True):

@@ -6,10 +6,9 @@ import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import tomlkit
 from msgspec.structs import replace
-from tomlkit.exceptions import TOMLKitError
 
+from unitcad.documents import parse_value
 from unitcad.errors import NEAREST, Refusal, UnitcadError, format_value
 from unitcad.serve.messages import Edit, Fault
 from unitcad.validation.plain_data import ABSENT, at, drop
@@ -134,6 +133,6 @@ def _changes(edit: Edit) -> Changes:
     if edit.remove or not edit.toml:
         return {edit.path: None if edit.remove else edit.value}
     try:
-        return {edit.path: tomlkit.value(str(edit.value)).unwrap()}
-    except (TOMLKitError, ValueError, RecursionError):
+        return {edit.path: parse_value(str(edit.value))}
+    except UnitcadError:
         return {}

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from unitcad.cli.shared_options import AllowCode
-from unitcad.errors import missing_extra
+from unitcad.extras import missing_extra
 from unitcad.validation import default_template
 
 

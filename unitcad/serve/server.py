@@ -12,6 +12,7 @@ from typing import Any
 
 import uvicorn
 
+from unitcad.documents import parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
 from unitcad.pipeline.write import clear_leftovers
@@ -22,7 +23,6 @@ from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, application
 from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source
-from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
 from unitcad.validation import compound_kind, custom_templates, default_template, every_template

@@ -11,7 +11,7 @@ from unitcad import catalogue
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.steps import casting_summary
 from unitcad.checks import check_moulds
-from unitcad.designs import design_of, no_estimate, widths
+from unitcad.designs import widths
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
@@ -135,10 +135,6 @@ def unit_procedure(moulds: MouldSet) -> Procedure:
 
 
 def _estimate(spec: Spec, answer: Answer) -> None:
-
-    if not design_of(spec).passes:
-        answer.lines = [f"{spec.design} has no estimate: {no_estimate()}"]
-        return
     # The elements take seconds: the page shows the formulas, `unitcad estimate` has the rest.
     answer.estimate = estimate_spec(spec, closed_forms(spec.estimate.models))
 

@@ -2,7 +2,7 @@
 
 from unitcad.spec.convert import check_plain, convert
 from unitcad.spec.resolved import MOTOR_SIZES, Spec, assumed_lengths, length_text, motor_of, printer_of, with_formats
-from unitcad.spec.toml import from_json, parse_toml, read_toml, spec_hash, to_data, to_json, to_toml
+from unitcad.spec.toml import from_json, spec_hash, to_data, to_json, to_toml
 
 __all__ = [
     "MOTOR_SIZES",
@@ -13,9 +13,7 @@ __all__ = [
     "from_json",
     "length_text",
     "motor_of",
-    "parse_toml",
     "printer_of",
-    "read_toml",
     "spec_hash",
     "to_data",
     "to_json",

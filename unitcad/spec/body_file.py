@@ -67,7 +67,7 @@ def body_text(design: str, path: Path) -> str:
         names = [f"layer{i + 1}" for i in range(len(bodies))]
     lines = [f"{_HEAD}: {path.name}" + (f", facets within {FACETS:g} mm" if _is_step(path) else "")]
     for name, (_, vertices, faces) in zip(names, bodies, strict=True):
-        solid = _on_grid(design, name, vertices, faces)
+        solid = on_grid(design, name, vertices, faces)
         lines.append(" ".join((name, *(base64.b64encode(held).decode() for held in (solid.vertices, solid.faces)))))
     return "\n".join(lines) + "\n"
 
@@ -108,7 +108,7 @@ def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:
     return [("", mesh.vertices, mesh.faces)] if mesh else []
 
 
-def _on_grid(design: str, name: str, vertices: np.ndarray, faces: np.ndarray) -> Polyhedron:
+def on_grid(design: str, name: str, vertices: np.ndarray, faces: np.ndarray) -> Polyhedron:
     """Return a body with its corners on the grid, on which faces of moulds meet them; flattened faces are dropped."""
     cells = np.floor(vertices * GRID_PER_MM + _HALF).astype("<i4")
     cells, index = np.unique(cells, axis=0, return_inverse=True)

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
+from unitcad.documents import expect_bounded
 from unitcad.errors import Refusal, UnknownKey, unknown_key, unknown_name
 from unitcad.spec.fields import (
     PLAIN_KINDS,
@@ -34,22 +35,22 @@ _MOST_KEYS, _MOST_WORDS = 5, 8
 """Keys of a table, and words of a key, that a refusal names."""
 _SWITCH = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 """Texts that mean true or false."""
-_LARGEST_INT = 2**63 - 1
 SOURCES = frozenset({"design_source", "fit_source"})
 """The fields whose text has lines."""
+_MOST = 1_000_000
+"""Entries of the largest record."""
 LONGEST_NAME = 120
 """Characters that the name of a key or of a table may have."""
-DEEPEST = 20
-"""Tables in tables that data may have: more than any spec or sweep needs."""
 
 
 def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
     """Return `data`, the table at `field`, as a `kind`, types strict. Raises Refusal for the first unfit value.
 
-    A number that is infinite, huge or none is refused at any place, and so is data that nests too deeply. A kind's
-    numbers have limits that they may reach (ge, le), so that a refusal can offer the limit. A key whose value is None
-    counts as missing.
+    Data out of the bounds of `unitcad.documents` is refused, and a number that is infinite or none at any place. A
+    kind's numbers have limits that they may reach (ge, le), so that a refusal can offer the limit. A key whose value is
+    None counts as missing.
     """
+    expect_bounded(data, field, most=_MOST)
     check_plain(data, field)
     data = without_none(data)
     try:
@@ -86,28 +87,24 @@ def without_none(node: Any) -> Any:
     return [without_none(value) for value in node] if isinstance(node, list | tuple) else node
 
 
-def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
-    """Raise Refusal for values that no key takes: huge numbers and NaN, dates, invisible characters, deep nesting."""
+def check_plain(node: Any, field: str = "") -> None:
+    """Raise Refusal for values that no key takes: infinity and NaN, dates, invisible characters, long names."""
     if isinstance(node, str) and not SOURCES.intersection(field.split(".")):
         _check_text(node, field)
     if isinstance(node, float) and not math.isfinite(node):
         raise Refusal(field, node, "must be a finite number")
-    if isinstance(node, int) and abs(node) > _LARGEST_INT:
-        raise Refusal(field, node, "is too large for a number here")
     if isinstance(node, str) and _HALF_PAIR.search(node):
         raise Refusal(field, node, "is not text in UTF-8")
     if isinstance(node, datetime.date | datetime.time):
         raise Refusal(field, node, "is a date or time, which nothing here takes; put quotes round a text")
     if isinstance(node, Mapping | list | tuple):
-        if depth > DEEPEST:
-            raise Refusal(".".join(field.split(".")[:3]), "...", f"nests more than {DEEPEST} tables deep")
         for key, below in node.items() if isinstance(node, Mapping) else enumerate(node):
             if isinstance(key, str):
                 if len(key) > LONGEST_NAME:
                     name = f"{printable(key[:20])}..."
                     raise Refusal(_below(field, name), len(key), f"a name has at most {LONGEST_NAME} characters")
                 _check_text(key, printable(_below(field, key)))
-            check_plain(below, _below(field, key), depth + 1)
+            check_plain(below, _below(field, key))
 
 
 def _check_text(text: str, field: str) -> None:

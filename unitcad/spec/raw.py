@@ -39,7 +39,7 @@ OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
 Moduli = Literal["small-strain", "quasi-static"]
-Model = Literal["rule", "published", "corrected", "divider", "fem"]
+Model = Literal["rule", "published", "corrected", "fem"]
 
 
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
@@ -248,7 +248,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     ] = "forearm"
     models: Annotated[
         tuple[Model, ...], Meta(min_length=1, description="models of the level; fem are the finite elements")
-    ] = ("rule", "published", "corrected", "divider")
+    ] = ("rule", "published", "corrected")
     moduli: Annotated[
         Moduli,
         Meta(description="modulus of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
@@ -302,7 +302,7 @@ class RawSpec(Table, frozen=True, kw_only=True):
     casting: CastingTable = CastingTable()
     estimate: EstimateTable = EstimateTable()
     output: OutputTable = OutputTable()
-    materials: dict[str, MaterialEntry] = {}
+    materials: Annotated[dict[str, MaterialEntry], Meta(max_length=1000)] = {}
     motors: dict[str, MotorEntry] = {}
     printers: dict[str, PrinterEntry] = {}
     tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1, description=_TISSUE)]] = {}

@@ -12,7 +12,6 @@ from unitcad import text
 from unitcad.arguments import check_number, path, texts
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.plan import check_outputs
-from unitcad.pipeline.subjects import subject
 from unitcad.report import write_report
 from unitcad.report.read_results import read_batch
 from unitcad.spec.raw import OUTPUTS, Format
@@ -46,7 +45,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> dict[str, Any]:
     refused: list[dict[str, Any]] = []
     for index in indices[:looked]:
         try:
-            variant = subject(sweep.spec(index))
+            variant = sweep.subject(index)
         except UnitcadError as error:
             refused.append({"index": index, "reason": sweep.faults(index, error)})
             continue

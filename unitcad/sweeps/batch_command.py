@@ -13,7 +13,7 @@ import typer
 from msgspec import to_builtins
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from unitcad.cli.output import console, print_json, print_json_line, progress, stage_lines, warn
+from unitcad.cli.output import print_json, print_json_line, progress, stage_lines, warn
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
@@ -27,9 +27,10 @@ from unitcad.cli.shared_options import (
     outputs,
     overrides,
 )
+from unitcad.cli.tables import console
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
-from unitcad.pipeline.write import PAGE
+from unitcad.pipeline.manifest import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.batch_call import make, place, preview

@@ -1,4 +1,4 @@
-"""The estimate-only sweep: no folders, one table of each variant's edge level by model."""
+"""The estimate-only sweep: no folders, one table of each variant's level at the edge."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 
 from msgspec import structs
 
-from unitcad.attenuation.edge.level import edge_level
 from unitcad.errors import UnitcadError
-from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
+from unitcad.estimate_inputs import answer_spec
+from unitcad.json_text import rounded
+from unitcad.pipeline.manifest import level_columns
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.journal import Journal, JournalEntry, Summary
@@ -20,7 +21,7 @@ from unitcad.sweeps.sweep import Sweep
 def write_estimates(
     sweep: Sweep, out: Path, options: BatchOptions, watch: Watch = lambda summary, outcome: None
 ) -> Summary:
-    """Write `variants.csv`, `batch.json` and `timings.json` of every variant's edge level by model into `out`.
+    """Write `variants.csv`, `batch.json` and `timings.json` of every variant's level at the edge into `out`.
 
     Variants that an earlier run in `out` finished are not evaluated again. Raises UnitcadError for a folder that isn't
     ours.
@@ -54,10 +55,7 @@ def _entry(sweep: Sweep, index: int) -> JournalEntry:
 
 
 def levels(spec: Spec) -> dict[str, float | None]:
-    """Return a spec's edge level by each of its models, without ranges; None if there is no number.
-
-    Raises Refusal as `estimate_spec`.
-    """
-    asked, fit = estimate_input(spec), fit_of(spec)
-    found = {model: edge_level(asked, model, fit)["value"] for model in closed_forms(spec.estimate.models)}
-    return {f"edge_{model}": level and float(f"{level:.6g}") for model, level in found.items()}
+    """Return the columns of a spec's level at the edge, to nine digits. Raises Refusal as `answer_spec`."""
+    one = answer_spec(spec)
+    measured = one.measured[0].level if one.measured else None
+    return rounded(level_columns({"level": one.level, "low": one.low, "high": one.high, "measured": measured}))

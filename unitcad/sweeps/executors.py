@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
-from unitcad.errors import UnitcadError, WrongArgument, missing_extra
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.extras import missing_extra
 from unitcad.workers import Pool, cores
 
 DASK_SECONDS = 6.0

@@ -1,4 +1,4 @@
-"""Which swept keys do not enter a model of the edge level, and which no measurement supports.
+"""Which swept keys the level at the edge does not read, and which no measurement supports.
 
 Levels that stay the same are no result of the sweep. If all measured units had the same length, only the model says how
 the level changes with it.
@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.estimates import leave_one_out_errors
 from unitcad.attenuation.edge.measured import nominal
-from unitcad.attenuation.edge.models import edge_levels, stored
+from unitcad.attenuation.edge.models import edge_levels
+from unitcad.attenuation.edge.ranges import lead_of
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
-from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
+from unitcad.estimate_inputs import estimate_input, fit_of
 from unitcad.report.read_results import SweptLevels
 from unitcad.spec import Spec
 from unitcad.sweeps.sweep import Sweep
@@ -38,7 +38,7 @@ _SAME = 1e-9
 
 
 def swept_estimate(sweep: Sweep, count: int) -> SweptLevels | None:
-    """Return the models' errors, the best first, and the keys that each does not read; None without an estimate.
+    """Return the swept keys that the level does not read; None without an estimate.
 
     Each key is changed by itself, from several variants, through several of its values, since a rule by name would have
     to know every model. A key that can't be changed by itself, or whose levels are not known, is taken for read.
@@ -48,24 +48,17 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptLevels | None:
     starts = [(index, spec) for index in _spread(count, _STARTS) if (spec := _spec(sweep, index))]
     if not starts:
         return None
-    models = closed_forms(starts[0][1].estimate.models)
-    unread: dict[str, list[str]] = {model: [] for model in models}
+    unread = []
     for path in sweep.paths:
         if not _OF_THE_UNIT.match(path):
             continue
-        groups = [_levels(sweep, index, path, models) for index, _ in starts]
-        for model in models:
-            told = [group[model] for group in groups if len(group[model]) > 1]
-            if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
-                unread[model].append(path)
+        groups = [_levels(sweep, index, path) for index, _ in starts]
+        told = [levels for levels in groups if len(levels) > 1]
+        if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
+            unread.append(path)
     fit = fit_of(starts[0][1])
-    errors = leave_one_out_errors(starts[0][1].estimate.moduli, fit)
-    ordered = sorted(models, key=lambda model: errors[model])
-    return SweptLevels(
-        {model: float(f"{errors[model]:.6g}") for model in ordered},
-        {model: unread[model] for model in ordered},
-        {} if fit else _not_measured(sweep, [spec for _, spec in starts]),  # a lab's units may have other lengths
-    )
+    # A lab's units may have other lengths.
+    return SweptLevels(unread, {} if fit else _not_measured(sweep, [spec for _, spec in starts]))
 
 
 def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
@@ -84,25 +77,17 @@ def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
 
 
 def warnings(found: SweptLevels | None) -> list[str]:
-    """Say which models do not read which swept keys."""
+    """Say which swept keys the level does not read."""
     if found is None:
         return []
-    by_keys: dict[tuple[str, ...], list[str]] = {}
-    for model, paths in found.insensitive.items():
-        if paths:
-            by_keys.setdefault(tuple(paths), []).append(model)
     lines = []
-    for paths, models in by_keys.items():
-        every = len(models) == len(found.insensitive) and len(models) > 1
-        does = "does" if len(models) == 1 else "do"
-        who = "no model of the edge level reads" if every else f"{join_words(models)} {does} not read"
-        whose = "the" if every else "their" if len(models) > 1 else "its"
-        lines.append(f"{who} {join_words(paths)}: {whose} level stays the same")
+    if found.unread:
+        lines.append(f"the level at the edge does not read {join_words(found.unread)}: at most its range changes")
     for length in dict.fromkeys(found.not_measured.values()):
         same = [path for path, one in found.not_measured.items() if one == length]
         lines.append(
             f"every measured unit had {length:g} mm for {join_words(same)}: no measurement shows how a level changes "
-            f"with {'it' if len(same) == 1 else 'them'}, and the error there is not known"
+            f"with {'it' if len(same) == 1 else 'them'}"
         )
     return lines
 
@@ -123,20 +108,24 @@ def _spec(sweep: Sweep, index: int) -> Spec | None:
     return spec
 
 
-def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:
-    """Return levels by model while only the value at a path goes through those of the sweep, from variant `index`."""
-    levels = {model: list[float]() for model in models}
+def _levels(sweep: Sweep, index: int, path: str) -> list[float]:
+    """Return the levels while only the value at a path goes through those of the sweep, from variant `index`.
+
+    By the leading model, without the measured units near it, whose weight every length changes.
+    """
+    levels = []
     for value in _values(sweep, path):
         data = sweep.data(index)
         try:
             put(data, path, value)
-            variant = estimate_input(from_data(data, Path()))
+            spec = from_data(data, Path())
+            variant = estimate_input(spec)
         except UnitcadError:
             continue
-        for model in models:
-            level = float(edge_levels(nominal(variant), model, stored(variant.moduli)[model])[0])
-            if np.isfinite(level) and level > 0:
-                levels[model].append(level)
+        lead = lead_of(variant.moduli, fit_of(spec))
+        level = float(edge_levels(nominal(variant), lead.model, lead.constants)[0])
+        if np.isfinite(level) and level > 0:
+            levels.append(level)
     return levels
 
 

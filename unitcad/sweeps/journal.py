@@ -23,6 +23,7 @@ from filelock import FileLock, Timeout
 from msgspec import Struct, ValidationError, convert, field, structs, to_builtins
 
 from unitcad import files
+from unitcad.documents import parse_json, read_json
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.plan import code_version
 from unitcad.sweeps.shard import Shard
@@ -226,7 +227,7 @@ def _unpack(line: bytes, seed: int) -> dict[str, Any] | None:
     text, _, _ = line.rpartition(b', "crc": "')
     if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
         return None
-    return json.loads(text + b"}")
+    return parse_json(text + b"}", "the journal")
 
 
 def _entry(line: bytes, seed: int) -> JournalEntry | None:
@@ -289,7 +290,7 @@ def _check_free(out: Path, head: BatchHead) -> None:
     if not any((out / lock).exists() for lock in locks):
         raise UnitcadError(f"{out}: has files that are no batch's result; choose another folder with -o")
     try:
-        there = files.read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)
+        there = read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)
         name, same = there["name"], there["batch"] == head.batch
     except (UnitcadError, KeyError, TypeError):
         return  # it was interrupted before there was a table

@@ -22,7 +22,9 @@ import msgspec
 
 from unitcad import files
 from unitcad.cache import digest
-from unitcad.errors import UnitcadError, missing_extra
+from unitcad.errors import UnitcadError
+from unitcad.extras import missing_extra
+from unitcad.json_text import parse_message
 
 _ADDRESS = re.compile(r"s3://[a-z0-9][a-z0-9.-]+(?:/[^/\s]+)*/?")
 MANIFEST = "manifest.json"
@@ -83,7 +85,7 @@ class ObjectStore:
         content = self.read(f"{folder}/{MANIFEST}")
         if content is None or digest(content) != manifest:
             return False
-        listed = msgspec.json.decode(content, type=_Listed).files
+        listed = parse_message(content, _Listed, f"{folder}/{MANIFEST}").files
         contents = ((self.read(f"{folder}/{path}"), file["sha256"]) for path, file in listed.items())
         return all(content is not None and digest(content) == sha256 for content, sha256 in contents)
 

@@ -20,7 +20,6 @@ from unitcad import __version__
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.plan import check_outputs, kernel_versions
-from unitcad.pipeline.subjects import subject
 from unitcad.pipeline.write import clear_leftovers, whole
 from unitcad.report.read_results import CSV
 from unitcad.spec.raw import OUTPUTS
@@ -251,11 +250,10 @@ class _Batch:
             if index is None:
                 return False
             try:
-                spec = self.sweep.spec(index)
+                wanted = self.sweep.subject(index)
             except UnitcadError as error:
                 self._finished(JournalEntry(index, tasks.REFUSED, self.sweep.faults(index, error)))
                 continue
-            wanted = subject(spec)
             first = self.seen.setdefault(int(wanted.folder_name[-12:], 16), index)
             if first != index:
                 self.journal.add(JournalEntry(index, same_as=first, values=self.sweep.values(index)[1]))

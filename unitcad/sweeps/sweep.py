@@ -28,11 +28,13 @@ from msgspec import Meta, Struct, field, structs
 
 from unitcad.cache import digest
 from unitcad.catalogue.entries import between
+from unitcad.documents import parse_json
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.files import names_device, read_text
-from unitcad.pipeline.subjects import subject_of_data
+from unitcad.pipeline.subject import Subject
+from unitcad.pipeline.subjects import compound, subject_of_data
 from unitcad.rooms import load
-from unitcad.spec import check_plain, convert
+from unitcad.spec import Spec, check_plain, convert
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 from unitcad.spec.paths import in_words, meant, paths_of
 from unitcad.spec.raw import RawSpec
@@ -263,16 +265,20 @@ class Sweep:
             chosen[path] = values[here]
         return list(self.bases)[base], {path: chosen[path] for path in self.axes}
 
-    def spec(self, index: int) -> Any:
-        """Return the resolved spec, or the array, of variant `index`. Raises Refusal."""
-        return subject_of_data(self.data(index)).of
+    def subject(self, index: int) -> Subject:
+        """Return variant `index`, a unit or an array of units, everything settled. Raises Refusal."""
+        return subject_of_data(self.data(index))
+
+    def spec(self, index: int) -> Spec:
+        """Return the resolved spec of variant `index`, of an array its unit's. Raises Refusal."""
+        return self.subject(index).unit
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return the faults of a refused variant in one line; `first` is its refusal."""
         kind = compound_kind(self.data(index))
         if isinstance(first, Refusal) and kind:
             if index < EXPLAINED:
-                return str(load(kind.subject).offered(first, self.data(index)))
+                return str(compound(kind).offered(first, self.data(index)))
             return str(Refusal(first.field, first.value, first.limit))  # without an offer, which nobody tried
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
@@ -293,7 +299,7 @@ class Sweep:
     def data(self, index: int) -> dict[str, Any]:
         """Return the plain data of variant `index`. Raises Refusal for a path that leads nowhere."""
         base, values = self.values(index)
-        data = json.loads(self._texts[base])
+        data = parse_json(self._texts[base], base)
         for path, value in values.items():
             put(data, path, value)
         swept = {path: value for path, value in values.items() if path not in self._alone}
@@ -375,7 +381,7 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
     place = folder / base if is_path(base) else base
     confirm_known(base, "base", Refusal)
     kind = compound_kind(place)
-    data = load(kind.subject).read(every_template().get(base) or Path(place)) if kind else read(place)
+    data = compound(kind).read(every_template().get(base) or Path(place)) if kind else read(place)
     check_plain(data)
     return data
 
@@ -395,10 +401,15 @@ def _values(path: str, given: Any, mode: Mode) -> Values:
             raise Refusal(f"sweep.{path}.num", values.num, "start and stop are the same value", 1)
         return values
     seen = [json.dumps(value) for value in values]
-    twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
-    if mode != "zip" and len(set(seen)) < len(seen) and len(seen) <= 10_000:
-        once = [json.loads(text) for text in dict.fromkeys(seen)]
-        raise Refusal(f"sweep.{path}", values, f'has {format_value(twice)} twice; only mode = "zip" may repeat', once)
+    counts = Counter(seen)
+    if mode != "zip" and len(counts) < len(seen) and len(seen) <= 10_000:
+        first: dict[str, Any] = {}
+        for text, value in zip(seen, values, strict=True):
+            first.setdefault(text, value)
+        twice = next(value for value, text in zip(values, seen, strict=True) if counts[text] > 1)
+        raise Refusal(
+            f"sweep.{path}", values, f'has {format_value(twice)} twice; only mode = "zip" may repeat', [*first.values()]
+        )
     return values
 
 

@@ -15,11 +15,13 @@ from msgspec import structs
 
 from unitcad import files
 from unitcad.cache import DiskStore, default_root, digest
+from unitcad.documents import read_json
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import write as folders
-from unitcad.pipeline.make import Subject
+from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes, row
 from unitcad.pipeline.plan import code_version
+from unitcad.pipeline.subject import Subject
 from unitcad.pipeline.subjects import subject_of_text
 from unitcad.spec import custom_code
 from unitcad.sweeps.journal import JournalEntry
@@ -125,7 +127,7 @@ def _make(job: Job, task: Task, out: Path, scratch: Path) -> JournalEntry:
     else:
         store = _store(task.cache or default_root())
         before = Counter(store.counts)
-        built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
+        built = folders.write(folder, partial(make, spec, task.only, task.check), store, scratch=scratch)
         manifest, sha256, counts = built.manifest, built.sha256, store.counts - before
         built_any, reused_any = (counts[f"file {what}"] + counts[f"data {what}"] for what in ("built", "reused"))
         reused = bool(reused_any and not built_any)
@@ -158,7 +160,7 @@ def _finished_manifest(folder: Path, spec: Subject, task: Task, damaged: str) ->
         return None
     try:
         same = (
-            files.read_json(folder / "timings.json", links=False).get("code") == task.code
+            read_json(folder / "timings.json", links=False).get("code") == task.code
             and set(manifest["outputs"]) == set(spec.outputs(task.only))
             and set(formats) == set(spec.formats)
             and task.check != any(left["reason"] == UNCHECKED for left in manifest["skipped"])

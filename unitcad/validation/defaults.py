@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
@@ -15,7 +14,8 @@ from unitcad import catalogue
 from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import EPS, check_ribs, farthest_push, leaf_mm, least_skirt, least_slot
-from unitcad.errors import Refusal, UnknownKey
+from unitcad.documents import parse_toml
+from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
@@ -83,9 +83,9 @@ def lab_fit(text: str) -> LabFit:
     from unitcad.attenuation.edge.ranges import LabFit, fault
 
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise Refusal(FIELD, None, f"not TOML: {error}") from None
+        data = parse_toml(text, "its text")
+    except UnitcadError as error:
+        raise Refusal(FIELD, None, str(error)) from None
     if kind := kind_of(data):
         raise Refusal(FIELD, None, f"is {with_article(kind.name)}, not a fit; {_NEXT}")
     try:
@@ -242,20 +242,10 @@ GRAVITY, MOTOR_G_CM3 = 9.80665, 5.0
 """Density of a motor whose mass no one states (assumed: coin motors have 4 to 6.5)."""
 
 
-def warnings(spec: Spec, estimate: bool = True) -> list[str]:
-    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's.
-
-    Without `estimate` those are left out that concern only the estimate.
-    """
+def warnings(spec: Spec) -> list[str]:
+    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
     design, found = design_of(spec), [*_thin_layers(spec), *_bonds(spec), *_leads(spec), *_roof(spec)]
-    if estimate:
-        unmeasured = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
-        found += [
-            f"{key} = {mm:g} mm: no measured unit has {what}; the estimate is that of the unit without it"
-            for key, (what, mm) in unmeasured.items()
-            if mm
-        ]
-        found += _of_another_motor(spec)
+    found += _of_another_motor(spec)
     low, high = CIRCUIT_STOCK
     if spec.fpcb and not low <= spec.fpcb.thickness_mm <= high:
         stock = f"flexible circuits are {low:g} to {high:g} mm thick"

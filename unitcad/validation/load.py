@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import os
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.resources import files
@@ -12,14 +11,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from unitcad.designs import default_design
+from unitcad.documents import line_of, parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
 from unitcad.rooms import FileKind, expect_none_but, file_kinds, of_other_kind
 from unitcad.rooms import load as load_reference
-from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
+from unitcad.spec import Spec, check_plain, convert, to_data
 from unitcad.spec.custom_code import is_body_file, is_custom, with_source
 from unitcad.spec.raw import RawSpec
-from unitcad.spec.toml import line_of
 from unitcad.validation.defaults import resolve
 from unitcad.validation.plain_data import ABSENT, Changes, Source, at, changes_of, plain, put, requested_data
 from unitcad.validation.suggestions import every_fault, suggest
@@ -296,7 +295,7 @@ def _locate(every: list[Refusal], data: dict[str, Any], source: Source) -> Refus
     path = _file(source)
     if path is not None:
         text = read_text(path)
-        written = tomllib.loads(text)
+        written = parse_toml(text, os.fspath(path))
         for one in every:
             # What an option or a caller changed, or validation worked out, stands on no line.
             if one.value is None or _same(at(written, one.field), at(data, one.field)):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import datetime
 import os
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, Protocol, cast
@@ -13,6 +12,7 @@ from typing import Any, Protocol, cast
 from msgspec import Struct
 
 from unitcad.arguments import confirm_form
+from unitcad.documents import DEEPEST, expect_bounded, parse_value
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, to_data
 from unitcad.spec.fields import fields_of, index_in, table_in, takes_none
@@ -34,6 +34,8 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
         if isinstance(node, list):
             node = node[_index(node, step, path, value)]
         elif isinstance(node, dict):
+            if step not in node and len(steps) > DEEPEST:
+                raise Refusal(f"{path[:40]}...", value, f"nests more than {DEEPEST} tables deep")
             node = node.setdefault(step, {})
         else:
             break
@@ -125,21 +127,26 @@ _DERIVED = {
 def plain(node: object, field: str = "") -> Any:
     """Return a value as TOML has it: tables as dicts without what is None, lists, numbers, texts.
 
-    Raises Refusal for a value of a class that no key takes.
+    Raises Refusal for a value of a class that no key takes, and for data out of bounds, such as a table in itself.
     """
+    expect_bounded(node, field)
+    return _plain(node, field)
+
+
+def _plain(node: object, field: str) -> Any:
     if isinstance(node, MotorSize) and node.absent:
         return False
     if isinstance(node, Struct):
         named = {name: getattr(node, name) for name in node.__struct_fields__}
         if isinstance(node, CastLayer) and not node.cap_mm:  # an open ring, whose cap a file leaves out
             del named["cap_mm"]
-        return plain({key: value for key, value in named.items() if value is not None}, field)
+        return _plain({key: value for key, value in named.items() if value is not None}, field)
     if isinstance(node, Mapping):
         table = cast("Mapping[object, object]", node)
-        return {str(key): plain(value, f"{field}.{key}".lstrip(".")) for key, value in table.items()}
+        return {str(key): _plain(value, f"{field}.{key}".lstrip(".")) for key, value in table.items()}
     if isinstance(node, list | tuple):
         entries = cast("Iterable[object]", node)
-        return [plain(value, f"{field}.{i}".lstrip(".")) for i, value in enumerate(entries)]
+        return [_plain(value, f"{field}.{i}".lstrip(".")) for i, value in enumerate(entries)]
     if node is None or isinstance(node, bool | datetime.date | datetime.time):  # `convert` refuses times
         return node
     if isinstance(node, str):
@@ -182,14 +189,16 @@ def changes_of(changes: Changes) -> dict[str, Any]:
         if not isinstance(text, str):
             raise UnitcadError(f'set takes a dict by path or texts "path=value", not {type(text).__name__}')
         path, _, value = confirm_form(text).partition("=")
-        found[path.strip()] = _parse(value.strip())
+        found[path.strip()] = _parse(value.strip(), path.strip())
     return found
 
 
-def _parse(text: str) -> Any:
+def _parse(text: str, path: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
+        return parse_value(text)
+    except Refusal as refusal:
+        raise Refusal(path + refusal.field.removeprefix("value"), refusal.value, refusal.limit) from None
+    except UnitcadError:
         pass
     try:
         return float(text)

@@ -10,8 +10,8 @@ from typing import Any
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo
 
+from unitcad.documents import read_toml
 from unitcad.spec.fields import entry_in, fields_of, is_value, meaning, table_in
-from unitcad.spec.toml import read_toml
 
 _NOT_OFFERED = ("design_source", "fit_source")
 _ABOUT_TABLES = (

@@ -52,7 +52,7 @@ def plan(array: Array) -> Plan:
     half = (outer[2] - outer[0]) / 2, (outer[3] - outer[1]) / 2
     strike = blade_piece(bar(half[1], sheet.thickness_mm), too_long=longer_than_bed(spec, 2 * half[1]))
     tools = base_piece(engrave(drawn, letters)), strike
-    layout = Layout((Cell(0.0, 0.0, ()),), 0.0, 0.0, half, half, half, HEIGHT * stroke)
+    layout = Layout((Cell(0.0, 0.0, ()),), 0.0, 0.0, (0.0, 0.0), half, half, HEIGHT * stroke)
     step = Step(
         index=1,
         name="layer1",

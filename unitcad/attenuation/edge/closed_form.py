@@ -11,6 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from unitcad.attenuation.edge.contrast import counts
+
 Wave = Literal["p", "s"]
 AIR_IMPEDANCE: dict[str, float] = {"p": 1.204 * 343.0, "s": 0.0}  # Pa s/m at 20 degC; air carries no shear wave
 
@@ -25,8 +27,8 @@ class Units:
     """Units of N layers: arrays whose last axis runs over the layers, inside out; omega, passes and whole lack it.
 
     youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; passes: how
-    often the wave from motor to skin passes a border between layers; whole: the least ratio of moduli at which a
-    border's effect was measured (`measured_levels.whole_ratio`).
+    often the wave from motor to skin passes a border between layers; place, doubt: those of the layers' silicones
+    (`contrast.place_of`), by default the logarithms of the moduli, without doubt.
     """
 
     youngs_modulus: Any
@@ -36,11 +38,15 @@ class Units:
     thickness: Any
     omega: Any
     passes: Any
-    whole: Any
+    place: Any = None
+    doubt: Any = 0.0
 
     def __post_init__(self) -> None:
+        if self.place is None:
+            object.__setattr__(self, "place", np.log(self.youngs_modulus))
         for field in fields(self):
             object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
+        object.__setattr__(self, "doubt", np.broadcast_to(self.doubt, np.shape(np.asarray(self.place))))
 
     def control(self, layer: int) -> Units:
         """Return own-material controls: the same unit, every layer of the material of `layer`."""
@@ -48,7 +54,7 @@ class Units:
         return replace(self, **one)
 
 
-_MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
+_MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "tan_delta", "place", "doubt")
 
 
 def wave_speed(youngs_modulus: Any, density: Any, poisson_ratio: Any, wave: Wave) -> Any:
@@ -122,29 +128,14 @@ def corrected_path(units: Units, wave: Wave = "s") -> Any:
         return passed * np.exp(-np.sum(rate * units.thickness, axis=-1))
 
 
-def crossings(units: Units) -> Any:
-    """Return k_t of shear waves to the power of `passes` and no exponential: a reading that the print does not have."""
-    return np.prod(transmissions(units)[..., :-1], axis=-1) ** units.passes
-
-
-def contrast(units: Units) -> Any:
-    """Return n E_outer/E_inner of the outermost and the innermost layer: the divider is s / (1 + kappa contrast)."""
-    e = units.youngs_modulus
-    return units.passes * e[..., -1] / e[..., 0]
-
-
 def borders(units: Units) -> Any:
-    """Return how much each border between layers counts, shape (..., N - 1): 1 if its inside is softer, -1 if stiffer.
-
-    Between equal moduli and the ratio `whole` it grows with the logarithm of the ratio.
-    """
-    ratio = np.diff(np.log(units.youngs_modulus), axis=-1)
-    return np.clip(ratio / np.log(units.whole)[..., None], -1.0, 1.0)
+    """Return how much each border of layers counts, shape (..., N - 1): 1 if its inside is softer, -1 if stiffer."""
+    return counts(units.place, units.doubt) - counts(-units.place, units.doubt)
 
 
 def softer_passes(units: Units) -> Any:
     """Return how often the wave passes a border whose inside is the softer one: the rule is s q^n with this n."""
-    return units.passes * np.sum(np.maximum(borders(units), 0.0), axis=-1)
+    return units.passes * np.sum(counts(units.place, units.doubt), axis=-1)
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,8 @@ from unitcad.attenuation.edge.measured import (
     nominal,
     stack_inputs,
     unit_class,
-    whole_ratio,
 )
-from unitcad.attenuation.edge.models import edge_levels, stored
+from unitcad.attenuation.edge.models import RULE, edge_levels, stored
 from unitcad.attenuation.edge.ranges import LabFit, predictive_block
 from unitcad.attenuation.inputs import EstimateInput, Pad, Quantity, SiliconeLayer
 
@@ -104,7 +103,9 @@ def _silicone(index: int, field: str, variant: EstimateInput, factor: float) -> 
     if field == "poisson_ratio" and quantity.middle * max(factor, 1.0 / factor) > 0.5:
         # No ratio lies above 1/2: the whole difference is taken below the value.
         factor = min(factor**2, 1.0)
-    layers[index] = replace(layers[index], **{field: _times(quantity, factor)})
+    layer = layers[index]
+    place = layer.place + (np.log(factor) if field == "youngs_modulus" else 0.0)
+    layers[index] = replace(layer, place=float(place), **{field: _times(quantity, factor)})
     return replace(variant, layers=tuple(layers))
 
 
@@ -174,24 +175,24 @@ def _pad_thickness(pad: Pad, variant: EstimateInput, factor: float) -> EstimateI
 
 
 _MOST_CORNERS = 12
+NO_PASSES = "the rule knows embedded and encapsulating units only"
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
 KINDS = {
     "rule": "two constants fitted to the measured levels: s, times q for each pass of a border whose inside is the "
-    "softer layer. It reads which side is softer and, below the least measured ratio of moduli, an assumed line in the "
-    "ratio's logarithm",
+    "softer layer. Silicones that differ less than the measured pairs count in proportion to the logarithm of their "
+    "moduli",
     "published": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
     "constant s from the table (f1 and f2 are not printed)",
     "corrected": "the same path with complex moduli, complex impedances and the exact attenuation; one constant s",
-    "divider": "empirical: a divider with two constants fitted to the measured table, no mechanics in it",
 }
 ASSUMPTIONS = {
     "rule": [
         "Fitted to nine levels of units with 1.25 mm walls at 100 to 150 Hz. Its form was chosen after they were seen.",
         "It can't tell one-material units apart: it gives each the same level, where 39.5, 45.2 and 60.2 % were "
         "measured.",
-        "Between equal moduli and the least measured ratio it follows the logarithm of the ratio: nothing was measured "
-        "there.",
+        "Between equal silicones and those of the measured units it follows the logarithm of their moduli: nothing was "
+        "measured there.",
         "More than two layers: every border with the softer layer inside counts, which nobody has measured.",
     ],
     "published": [
@@ -205,11 +206,6 @@ ASSUMPTIONS = {
     "corrected": [
         "The same single path as the paper's: half-spaces, no reflections that come back, no path into the skin.",
         "One loss factor for each material at all frequencies, Poisson's ratio real.",
-    ],
-    "divider": [
-        "Fitted to nine levels of units with 1.25 mm walls at 100 to 150 Hz: thickness, density, damping and frequency "
-        "do not enter it.",
-        "More than two layers: the outermost against the innermost one, which nobody has measured.",
     ],
 }
 
@@ -256,13 +252,16 @@ def _units(variant: EstimateInput, rows: np.ndarray) -> Units:
         thickness=np.tile([layer.thickness for layer in variant.layers], (len(rows), 1)),
         omega=2.0 * np.pi * rows[:, -1],
         passes=np.full(len(rows), variant.passes),
-        whole=np.full(len(rows), whole_ratio(variant.moduli)),
+        place=np.tile([layer.place for layer in variant.layers], (len(rows), 1)),
+        doubt=np.tile([layer.doubt for layer in variant.layers], (len(rows), 1)),
     )
 
 
 @lru_cache(maxsize=4)
 def unknown(variant: EstimateInput) -> str:
     """Return why there can be no number: the first input that is not known; empty if all are."""
+    if variant.passes != variant.passes:
+        return NO_PASSES
     for (name, field), quantity in _inputs(variant):
         if not quantity.known:
             return f"{name} {field}: {quantity.note}"
@@ -299,7 +298,15 @@ def spread(variant: EstimateInput, values: Any) -> dict[str, Any]:
 
 def edge_level(variant: EstimateInput, model: str, fit: LabFit | None = None) -> dict[str, Any]:
     """Return a model's edge level as {value, low, high}."""
-    return spread(variant, edge_levels(corners(variant), model, _constants(variant, model, fit)))
+    return _spread(variant, model, edge_levels(corners(variant), model, _constants(variant, model, fit)))
+
+
+def _spread(variant: EstimateInput, model: str, values: Any) -> dict[str, Any]:
+    """Return `spread`; of the rule, which reads the silicones' places, the middle value alone."""
+    if model != RULE:
+        return spread(variant, values)
+    value = _number(np.atleast_1d(values)[0])
+    return {"value": value, "low": value, "high": value, **({} if value is not None else {"reason": unknown(variant)})}
 
 
 def _constants(variant: EstimateInput, model: str, fit: LabFit | None) -> dict[str, float]:
@@ -314,19 +321,19 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
     """
     units, constants = corners(variant), _constants(variant, model, fit)
     own = edge_levels(units, model, constants)
-    edge = {**spread(variant, own), "unit": "of the motor's amplitude"}
+    edge = {**_spread(variant, model, own), "unit": "of the motor's amplitude"}
     block: dict[str, Any] = {"kind": KINDS[model], "edge_level": edge}
     if fit:
         block["predictive"] = predictive_block(fit, model, variant, unknown(variant))
     if variant.amplitude is not None:
-        block["edge_amplitude_um"] = spread(variant, variant.amplitude * 1e6 * own)
-    by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
+        block["edge_amplitude_um"] = _spread(variant, model, variant.amplitude * 1e6 * own)
+    by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, fitted with those of other labs"
     block["constants"] = {**constants, "made_by": by_fit or "least squares of the log of nine measured levels"}
     # A control for each distinct material, by the number of its first layer.
     names = [layer.material for layer in variant.layers]
     controls = [names.index(name) for name in dict.fromkeys(names)] if len(names) > 1 else []
     block["hierarchical_over_control"] = [
-        {"control": names[i], **spread(variant, own / edge_levels(units.control(i), model, constants))}
+        {"control": names[i], **_spread(variant, model, own / edge_levels(units.control(i), model, constants))}
         for i in controls
     ] or None
     if not controls:

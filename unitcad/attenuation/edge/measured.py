@@ -12,13 +12,14 @@ import numpy as np
 from msgspec.structs import replace
 
 from unitcad.attenuation.edge.closed_form import Units, borders, softer_passes
+from unitcad.attenuation.edge.contrast import place_of
 from unitcad.attenuation.inputs import EstimateInput, SiliconeLayer
 from unitcad.catalogue import Material, materials, measurements, motors
 
 CONTROL = "single"
 """Word in place of the design in a control's name."""
 CLASSES = ("control", "stiff inside", "soft inside, one pass", "soft inside, two passes")
-"""One layer; no border with the softer layer inside; such a border, passed once (open rings); passed more often."""
+"""One layer; no border that is likely to count; such a border, passed once (open rings); passed more often."""
 Moduli = Literal["small-strain", "quasi-static", "data sheet"]
 """As the paper prints them, or from a test at the motor's frequency; of a slow pull; of the data sheet, at 100 %."""
 Predict = Callable[[Units], Any]
@@ -67,19 +68,11 @@ class MeasuredTable:
 
 def unit_class(units: Units) -> Any:
     """Return the number of each unit's class in `CLASSES`, shape (...)."""
-    count, passes = softer_passes(units), np.broadcast_to(units.passes, units.thickness.shape[:-1])
+    passes = np.broadcast_to(units.passes, units.thickness.shape[:-1])
     if units.thickness.shape[-1] == 1:
         return np.zeros(passes.shape)
-    return np.where(count <= 0.0, 1.0, np.where(passes <= 1.0, 2.0, 3.0))
-
-
-@cache
-def whole_ratio(moduli: Moduli = "small-strain") -> float:
-    """Return the least ratio of moduli, the softer layer inside, at which a unit was measured, by such moduli."""
-    data = measurements()
-    pairs = [data.layers(unit) for design in data.designs.values() for unit in design.levels]
-    values = [[_modulus(materials()[name], moduli) for name in pair] for pair in pairs]
-    return min(outer / inner for inner, outer in values if outer > inner)
+    soft = softer_passes(units) >= 0.5 * passes
+    return np.where(soft, np.where(passes <= 1.0, 2.0, 3.0), 1.0)
 
 
 @cache
@@ -132,7 +125,7 @@ def _units(design: str, layers: tuple[str, ...], moduli: Moduli) -> Units:
         "tan_delta": [float(m.loss_factor) for m in known],
         "thickness": [2e-3 * shared.wall_mm / len(layers)] * len(layers),
         "omega": 2 * np.pi * shared.frequency_hz,
-        "whole": whole_ratio(moduli),
+        "place": [place_of(material).at for material in known],
     }
     return Units(
         **{key: [value] * len(shapes) for key, value in one.items()}, passes=[shape.passes for shape in shapes]
@@ -168,7 +161,8 @@ def stack_inputs(variants: Sequence[EstimateInput]) -> Units:
         thickness=[[layer.thickness for layer in row] for row in layers],
         omega=[2.0 * np.pi * variant.frequency.middle for variant in variants],
         passes=[variant.passes for variant in variants],
-        whole=[whole_ratio(variant.moduli) for variant in variants],
+        place=[[layer.place for layer in row] for row in layers],
+        doubt=[[layer.doubt for layer in row] for row in layers],
     )
 
 
@@ -181,7 +175,9 @@ def merge_layers(variant: EstimateInput, within: float = 0.0) -> EstimateInput:
     groups: list[list[int]] = []
 
     def alike(one: SiliconeLayer, other: SiliconeLayer) -> bool:
-        values = [[layer.density, *(getattr(layer, field).middle for field in FIELDS)] for layer in (one, other)]
+        values = [
+            [layer.density, layer.place, *(getattr(layer, field).middle for field in FIELDS)] for layer in (one, other)
+        ]
         return one.material == other.material or bool(np.allclose(*values, rtol=within, atol=0.0))
 
     for i, layer in enumerate(layers):
@@ -200,39 +196,47 @@ FREQUENCIES = (100.0, 150.0)
 """The frequencies of the measured units, Hz (section III-A of the paper)."""
 COORDINATES = (
     "diameter", "motor's diameter", "motor's height", "cavity's height", "frequency", "walls", "caps",
-    "place of the borders", "place of the borders in the caps", "modulus inside", "modulus outside", "passes",
+    "place of the borders", "place of the borders in the caps", "silicone inside", "silicone outside", "passes",
 )  # fmt: skip
 """Logarithms of a unit's inputs over those that all measured units share, then the differences of measured units."""
 LENGTHS = 9
 """How many of the `COORDINATES` all measured units of the paper share: they are 0 for them."""
-_NAMES = ("diameter", "motor", "motor", "height of the cavity", "frequency", "walls", "caps", "walls", "caps")
+LENGTH_NAMES = ("diameter", "motor", "motor", "height of the cavity", "frequency", "walls", "caps", "walls", "caps")
 _SAME = 1e-4
 """Lengths whose logarithms differ by less are the same."""
 
 
 @dataclass(frozen=True)
 class Lengths:
-    """Lengths of units of N layers, m: arrays without the layers' axis, but for the caps (0: open rings)."""
+    """Lengths of units of N layers, m: arrays without the layers' axis, but for the caps (0: open rings).
+
+    `features`: for each unit the tuple of those that no measured unit had.
+    """
 
     diameter: np.ndarray
     motor_radius: np.ndarray
     motor_height: np.ndarray
     core_height: np.ndarray
     caps: np.ndarray
+    features: np.ndarray
 
 
 def lengths(variants: Sequence[EstimateInput]) -> Lengths:
     """Return the lengths of variants of one number of layers, a row each."""
     shapes = [variant.geometry for variant in variants]
+    features = np.empty(len(shapes), dtype=object)
+    features[:] = [variant.features for variant in variants]
     return Lengths(
         np.array([variant.diameter for variant in variants]),
         np.array([shape.motor_radius for shape in shapes]),
         np.array([shape.motor_height for shape in shapes]),
         np.array([shape.core_height for shape in shapes]),
         np.array([[layer.cap for layer in shape.layers] for shape in shapes]),
+        features,
     )
 
 
+@np.errstate(all="ignore")  # a custom design may lack a length
 def coordinates(units: Units, of: Lengths) -> np.ndarray:
     """Return the `COORDINATES` of units, shape (rows, 12). They change continuously with the lengths and
     do not depend on cuts within a layer.
@@ -262,8 +266,8 @@ def coordinates(units: Units, of: Lengths) -> np.ndarray:
         np.log(np.where(capped, of.caps.sum(axis=-1), 2.0 * wall) / (2.0 * wall)),
         places(units.thickness),
         places(of.caps),
-        np.log(units.youngs_modulus[..., 0]),
-        np.log(units.youngs_modulus[..., -1]),
+        units.place[..., 0],
+        units.place[..., -1],
         units.passes * counts.sum(axis=-1),
     ]
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
@@ -286,7 +290,7 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     if not rows:
         return extra and {"level": None, **extra}
     index, shared = rows[0], measurements().unit
-    differs = [*differing(coordinates_of(variant)), *_not_read(variant)]
+    differs = [*differing(coordinates_of(variant)), *(feature.name for feature in variant.features)]
     return {
         "level": float(table.levels[index]),
         **(extra or {}),
@@ -307,19 +311,17 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
 
 
 def nearest(variant: EstimateInput) -> dict[str, Any]:
-    """Return {unit, level, differs_in, not_read} of the paper's unit that is nearest to a variant.
-
-    `differs_in`: inputs that widen the range; `not_read`: inputs that the range does not know.
+    """Return {unit, level, differs_in} of the paper's unit that is nearest to a variant.
 
     Among units of its class, of its design if there are any, the one whose moduli are nearest.
     """
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
-    known = _moduli(variant.moduli)
+    known = _places()
     own = CONTROL if len(layers) == 1 else variant.design
     kind = int(unit_class(stack_inputs([variant]))[0])
     alike = [i for i, group in enumerate(table.classes) if group == kind]
     alike = [i for i in alike if table.designs[i] == own] or alike
-    ends = np.log([layer.youngs_modulus.middle for layer in (variant.layers[0], variant.layers[-1])])
+    ends = [variant.layers[0].place, variant.layers[-1].place]
     row = min(alike, key=lambda i: (table.layers[i] != layers, float(np.abs(np.nan_to_num(known[i] - ends)).sum())))
     differs = {
         "number of layers": len(layers) != len(table.layers[row]),
@@ -329,31 +331,23 @@ def nearest(variant: EstimateInput) -> dict[str, Any]:
     return {
         "unit": table.names[row],
         "level": float(table.levels[row]),
-        "differs_in": [*(name for name, other in differs.items() if other), *differing(coordinates_of(variant))],
-        "not_read": _not_read(variant),
+        "differs_in": [
+            *(name for name, other in differs.items() if other),
+            *differing(coordinates_of(variant)),
+            *(feature.name for feature in variant.features),
+        ],
     }
 
 
 @cache
-def _moduli(moduli: Any) -> np.ndarray:
-    """Return ln modulus of the innermost and outermost layer of each unit of the table, shape (units, 2)."""
-    return measured_table(moduli).mean(lambda units: np.log(units.youngs_modulus[..., [0, -1]]))
-
-
-def _not_read(variant: EstimateInput) -> list[str]:
-    """Return the inputs that the measured units share, this unit does not, and neither model nor range reads."""
-    shared = measurements().unit
-    motor = motors()[shared.motor]
-    return [
-        *(["drive"] if motor.drive is not None and variant.drive != motor.drive.value else []),
-        *(["tissue"] if variant.tissue_name != shared.tissue else []),
-        *variant.unread,
-    ]
+def _places() -> np.ndarray:
+    """Return the places of the innermost and outermost silicone of each unit of the table, shape (units, 2)."""
+    return measured_table().mean(lambda units: units.place[..., [0, -1]])
 
 
 def differing(place: np.ndarray) -> list[str]:
     """Return the names of the coordinates of a unit, (12,), that are not as in the measured ones."""
-    own = zip(_NAMES, place[:LENGTHS], strict=True)
+    own = zip(LENGTH_NAMES, place[:LENGTHS], strict=True)
     return list(dict.fromkeys(name for name, far in own if abs(far) > _SAME))
 
 

@@ -13,18 +13,21 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import combinations
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
-from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.closed_form import Units, borders
+from unitcad.attenuation.edge.contrast import counts
 from unitcad.attenuation.edge.measured import (
+    CLASSES,
     COORDINATES,
+    LENGTH_NAMES,
     LENGTHS,
     Lengths,
     MeasuredTable,
@@ -40,14 +43,14 @@ from unitcad.attenuation.edge.models import (
     COMPARED,
     MODELS,
     RULE,
-    assessments,
     edge_levels,
-    leader,
-    leave_one_out_logs,
     stored,
 )
+from unitcad.attenuation.edge.scores import LeadScore, scores
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue.entries import between
+from unitcad.catalogue.moduli import method_spread
+from unitcad.lean_scipy import special
 from unitcad.text import some
 
 Positive = Annotated[float, between(1e-9, 1e9)]
@@ -86,7 +89,8 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`.
 
-    `place`: its `measured.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads.
+    `place`: its `measured.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads; `features`: names
+    of those that no unit of the paper had; `lab`: the other lab that measured it, None for the fit's own.
     """
 
     unit: str
@@ -97,6 +101,8 @@ class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     frequency_hz: Positive
     place: Annotated[list[float], Meta(min_length=len(COORDINATES), max_length=len(COORDINATES))]
     residual: float
+    features: list[str] = []
+    lab: str | None = None
     source: str = ""
 
 
@@ -110,20 +116,27 @@ class InputFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A lab's fit: `units` of its own, with or without the paper's nine, by which moduli; `leads`: `models.leader`.
 
-    `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
+    `between_labs`, `between_batches`: expected standard deviation of ln level between labs and between batches, over
+    that between units.
     """
 
     format: Annotated[int, between(1, 1)]
     name: Annotated[str, Meta(min_length=1, max_length=100)]
-    units: Annotated[int, between(1, 100000)]
+    units: Annotated[int, between(0, 100000)]
     moduli: Literal["small-strain", "quasi-static"]
     include_paper_units: bool
     between_labs: Annotated[float, between(0, 100)]
+    between_batches: Annotated[float, between(0, 100)]
     seed: int
-    leads: Literal["rule", "published", "corrected", "divider"]
+    leads: Literal["rule", "published", "corrected"]
     model: dict[str, ModelFit]
     measured: Annotated[list[OwnLevel], Meta(min_length=1)]
     input: list[InputFile] = []
+
+    @property
+    def own(self) -> list[OwnLevel]:
+        """The levels that the fit's own lab measured."""
+        return [one for one in self.measured if one.lab is None]
 
     def constants(self, model: str) -> dict[str, float]:
         """Return a model's constants. Raises KeyError for one that it does not have."""
@@ -166,7 +179,7 @@ def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, fl
 
 def quantiles(df: int, centre: float, scale: float) -> tuple[float, ...]:
     """Return the levels at `PERCENT` of a predictive of ln level."""
-    return tuple(float(np.exp(centre + scale * stdtrit(df, percent / 100))) for percent in PERCENT)
+    return tuple(float(np.exp(centre + scale * special.stdtrit(df, percent / 100))) for percent in PERCENT)
 
 
 def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: str) -> dict[str, Any]:
@@ -225,47 +238,66 @@ def own_block(fit: LabFit, variant: EstimateInput) -> list[dict[str, Any]]:
     key = unit_key(variant)
     return [
         {name: getattr(one, name) for name in ("unit", "value", "low", "high", "frequency_hz", "source")}
-        for one in fit.measured
+        for one in fit.own
         if one.key == key
     ]
 
 
 LENGTH_SLOPES = np.array([1.2, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 0.5])
-MODULUS_SLOPE = 1.0
 """Standard deviations of d ln level / d ln input without measurement, of the first `COORDINATES`: assumed.
 
-Finite elements give 0.1 for walls and caps, up to 1.2 for the diameter, and factors of 0.2 to 3 from 60 to 200 Hz. The
-two measured pairs that differ in one modulus give +0.7 and +1.6.
+Finite elements give 0.1 for walls and caps, up to 1.2 for the diameter, and factors of 0.2 to 3 from 60 to 200 Hz.
+"""
+FEATURES: dict[str, Callable[[float], float]] = {
+    "shape of its own": lambda size: 0.5,
+    "axial drive": lambda size: 1.8,
+    "tissue": lambda size: 0.6 * size,
+    "film on the skin side": lambda mm: 0.17 * mm,
+    "silicone round the motor": lambda size: 0.2,
+    "lip": lambda mm: 0.4 * mm,
+    "draft": lambda degrees: math.tan(math.radians(degrees)),
+    "wires in place of a circuit": lambda size: 0.0,
+    "missing circuit": lambda size: 0.0,
+}
+"""Standard deviation of ln level that a feature adds, by its size.
+
+By finite elements: 80 % of |ln(level with / level without)|, over the unknowns of six units, both readings and both
+drives, over the same quantile of a normal distribution. 1.81 axial over flat; 0.16 for a gel of 50 kPa, whose ln
+compliance is 0.28 from the forearm's; 0.07, 0.10, 0.18 and 0.31 for a film of 0.3, 0.5, 1 and 2 mm; 0.20 for a filled
+ring. Assumed: a lip of 0.5 mm as a filled ring, a draft as thicker walls, a shape of its own as walls that differ by a
+factor e. A missing circuit adds nothing: the paper does not say how its own stiffens the unit, nor whether it does.
 """
 OF_THE_KIND = 0.5
 """Part of a residual's variance that belongs to the kind of unit, not to cast and reading: assumed."""
-_KIND_LENGTHS = np.array([1.0] * LENGTHS + [0.1, 0.1, 0.3])
-"""Differences of the coordinates at which a residual counts exp(-1/2): units of other silicones are other kinds."""
-_EDGE = 0.05
-"""A border that counts more than this and less than 1 less this has a range that holds both ends."""
+_PASSES_LENGTH = 0.3
+
+
+@cache
+def _kind_lengths() -> np.ndarray:
+    """Return differences of the coordinates at which a residual counts exp(-1/2): other silicones are other kinds.
+
+    Two silicones are told apart by the scatter of one method's modulus about its true value.
+    """
+    reading = method_spread() / math.sqrt(2.0)
+    return np.array([1.0] * LENGTHS + [reading, reading, _PASSES_LENGTH])
 
 
 @dataclass(frozen=True)
 class Predictive:
-    """Student-t distributions of ln level of any number of units, shape (...); NaN if an input is not known.
-
-    Half of each is below `centre`, with the scale `below`, half above it with the scale `above`.
-    """
+    """Student-t distributions of ln level of any number of units, shape (...); NaN if an input is not known."""
 
     degrees_of_freedom: int
     centre: np.ndarray
-    below: np.ndarray
-    above: np.ndarray
+    scale: np.ndarray
 
     def at_most(self, level: float | np.ndarray) -> np.ndarray:
         """Return the probability that the level (motor = 1) is at most `level`, shape (...)."""
         away = np.log(np.asarray(level, dtype=float)) - self.centre
-        return stdtr(self.degrees_of_freedom, away / np.where(away < 0, self.below, self.above))
+        return special.stdtr(self.degrees_of_freedom, away / self.scale)
 
     def quantile(self, share: float) -> np.ndarray:
         """Return the level that a share of the distribution lies below, shape (...)."""
-        scale = self.below if share < 0.5 else self.above
-        return np.exp(self.centre + scale * stdtrit(self.degrees_of_freedom, share))
+        return np.exp(self.centre + self.scale * special.stdtrit(self.degrees_of_freedom, share))
 
     @property
     def range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -278,9 +310,10 @@ class Predictive:
 class Lead:
     """The model that leads, with its constants, and the measured units behind it.
 
-    `places`: coordinates of the measured units; `residuals`: ln(measured/model) of the first of them. `moduli`: ln of
-    the least and the largest modulus among them, Pa. `covariance`: of the constants' logarithms over sigma^2; None if
-    sigma has their error in it.
+    `places`: coordinates of the measured units; `residuals`: ln(measured/model) of the first of them. `silicones`: the
+    least and the largest place of a silicone among them; `contrast`: the largest difference between neighbours.
+    `common_slope`, `contrast_slope`: see `LeadScore`. `features`: names of those that some measured unit had.
+    `covariance`: of the constants' logarithms over sigma^2; None if sigma has their error in it.
     """
 
     model: str
@@ -289,7 +322,11 @@ class Lead:
     sigma: float
     places: np.ndarray
     residuals: np.ndarray
-    moduli: tuple[float, float]
+    silicones: tuple[float, float]
+    contrast: float
+    common_slope: float
+    contrast_slope: float
+    features: frozenset[str] = frozenset()
     covariance: np.ndarray | None = None
 
     @np.errstate(all="ignore")  # unknown inputs are NaN; a legal extreme may overflow
@@ -305,43 +342,70 @@ class Lead:
         if self.covariance is not None:
             g = model.gradient(units, own)
             kept = kept + np.einsum("...i,ij,...j", g, self.covariance, g)
-        variance = self.sigma**2 * kept + self._far(at)
-        below, above = (np.sqrt(variance + more) for more in self._unmeasured_borders(units))
+        added = sum(self.unmeasured(units, of).values())
         centre = model.logs(units, own) + weights.T @ self.residuals
-        return Predictive(self.degrees_of_freedom, centre, below, above)
+        return Predictive(self.degrees_of_freedom, centre, np.sqrt(self.sigma**2 * kept + added))
 
-    def _far(self, at: np.ndarray) -> np.ndarray:
-        """Return the variance added by lengths, frequency and moduli outside the measured ones."""
+    def unmeasured(self, units: Units, of: Lengths) -> dict[str, np.ndarray]:
+        """Return the variance of ln level that each input adds that no measured unit had, by its name."""
+        at = coordinates(units, of)[:, :LENGTHS]
         # A place at a time: a search has many rows.
-        places = np.unique(self.places, axis=0)[:, :LENGTHS]
-        apart = [np.sum((LENGTH_SLOPES * (at[:, :LENGTHS] - own)) ** 2, axis=-1) for own in places]
-        away = np.min(apart, axis=0)
-        ends = at[:, LENGTHS : LENGTHS + 2]
-        outside = np.sum((ends - np.clip(ends, *self.moduli)) ** 2, axis=-1)
-        return away + MODULUS_SLOPE**2 * outside
+        apart = np.array([(LENGTH_SLOPES * (at - own)) ** 2 for own in np.unique(self.places, axis=0)[:, :LENGTHS]])
+        nearest = np.argmin(apart.sum(axis=-1), axis=0)
+        away = apart[nearest, np.arange(len(at))]
+        found: dict[str, np.ndarray] = {}
+        for i, name in enumerate(LENGTH_NAMES):
+            found[name] = found.get(name, 0.0) + away[:, i]
+        for name in {feature.name for own in set(of.features) for feature in own} - self.features:
+            sizes = [sum(feature.size for feature in own if feature.name == name) for own in of.features]
+            found[name] = np.array([FEATURES[name](size) ** 2 if size else 0.0 for size in sizes])
+        return {**found, "silicones": self._silicones(units), "number of layers": self._more_layers(units)}
 
-    def _unmeasured_borders(self, units: Units) -> tuple[np.ndarray, np.ndarray]:
-        """Return the variance below and above the centre added by borders that no measured unit had.
+    def _silicones(self, units: Units) -> np.ndarray:
+        """Return the variance of silicones that no measured unit had.
 
-        The rule between equal moduli and the least measured ratio: its range holds both ends. Each border but the
-        strongest may count or not: half its effect.
+        Below the measured difference a border counts or not: half of its effect is in the range if both are as likely.
         """
-        counts = borders(units)
-        effect = (units.passes * -math.log(stored()[RULE]["q"]))[..., None]
-        size = np.sort(np.abs(counts), axis=-1)[..., :-1]
-        either = np.sum((effect * size / 2.0) ** 2, axis=-1)
+        middle = units.place.mean(axis=-1)
+        variance = (self.common_slope * (middle - np.clip(middle, *self.silicones))) ** 2
+        apart = np.diff(units.place, axis=-1)
+        if not apart.shape[-1]:
+            return variance
+        beyond = np.maximum(np.max(np.abs(apart), axis=-1) - self.contrast, 0.0)
+        variance = variance + (self.contrast_slope * beyond) ** 2
+        return variance + np.sum(self._doubtful(units) ** 2, axis=-1)
+
+    def _doubtful(self, units: Units) -> np.ndarray:
+        """Return the standard deviation of ln level of each border that may count or not, shape (..., N - 1)."""
         if self.model != RULE:
-            return either, either
-        soft = np.maximum(counts, 0.0)
-        effect = effect * np.minimum(1.0, np.minimum(soft, 1.0 - soft) / _EDGE)
-        end = stdtrit(self.degrees_of_freedom, PERCENT[1] / 100)
-        down, up = (np.sum((effect * far / end) ** 2, axis=-1) for far in (1.0 - soft, soft))
-        return either + down, either + up
+            return np.zeros((*units.place.shape[:-1], units.place.shape[-1] - 1))
+        share = counts(units.place, units.doubt)
+        return self._effect(units) * np.minimum(share, 1.0 - share)
+
+    def _more_layers(self, units: Units) -> np.ndarray:
+        """Return the variance, on top of the silicones', of borders that no measured unit had.
+
+        Each but the strongest may count or not, so that half of its effect is in the range.
+        """
+        found, doubtful = borders(units), self._doubtful(units)
+        stiff = math.log(stored()[BASELINE][CLASSES[1]] / stored()[BASELINE][CLASSES[0]]) / self._half_width
+        half = np.maximum(found, 0.0) * self._effect(units) / 2.0 + np.maximum(-found, 0.0) * stiff
+        more = np.maximum(half**2 - doubtful**2, 0.0)
+        return more.sum(axis=-1) - more.max(axis=-1, initial=0.0)
+
+    @property
+    def _half_width(self) -> float:
+        """Half the width of a range in standard deviations."""
+        return float(special.stdtrit(self.degrees_of_freedom, PERCENT[1] / 100))
+
+    def _effect(self, units: Units) -> np.ndarray:
+        """Return the standard deviation of ln level at which a range is as wide as twice a border's effect."""
+        return (units.passes * -math.log(stored()[RULE]["q"]))[..., None] / self._half_width
 
 
 def _kernel(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the correlation of residuals between units at coordinates (n, 12) and (m, 12), shape (n, m)."""
-    apart = [np.sum(((one - own) / _KIND_LENGTHS) ** 2, axis=-1) for own in other]
+    apart = [np.sum(((one - own) / _kind_lengths()) ** 2, axis=-1) for own in other]
     return OF_THE_KIND * np.exp(-0.5 * np.reshape(apart, (len(other), len(one))).T)
 
 
@@ -357,64 +421,90 @@ def predictive_of(variants: Sequence[EstimateInput], fit: LabFit | None = None) 
 
 @cache
 def _of_paper(moduli: Moduli) -> Lead:
-    found = assessments(moduli)
-    return lead_on(measured_table(moduli), leader({name: one.leave_one_out_errors for name, one in found.items()}))
+    known = scores(moduli)
+    return _lead(measured_table(moduli), known.lead.model, known.constants[known.lead.model], known.lead)
 
 
 def lead_on(table: MeasuredTable, name: str) -> Lead:
-    """Return a model as the leading one on the paper's units, or on some of them."""
-    model, everyone = COMPARED[name], np.ones((1, len(table.names)))
-    constants = model.fit(table, everyone)[0]
-    off = leave_one_out_logs(name, table)
-    e = np.concatenate([units.youngs_modulus.ravel() for units in table.inputs])
+    """Return a model as the leading one on the paper's units, or on some of them, fitted anew."""
+    model, count = COMPARED[name], len(table.names)
+    constants = dict(zip(model.names, model.fit(table, np.ones((1, count)))[0].tolist(), strict=True))
+    out = np.diagonal(model.levels(table, ~np.eye(count, dtype=bool)))
+    sigma = float(np.sqrt(np.sum(np.log(table.levels / out) ** 2) / (count - 1)))
+    residuals = np.log(table.levels / model.levels(table, np.ones((1, count)))[0]).tolist()
+    alone = [float(units.place[0, 0]) for units in table.inputs if units.place.shape[-1] == 1]
+    common = sigma / math.sqrt(float(np.sum((np.array(alone) - np.mean(alone)) ** 2)))
+    return _lead(table, name, constants, LeadScore(name, sigma, residuals, common, _contrast_slope(table), 0))
+
+
+def _contrast_slope(table: MeasuredTable) -> float:
+    """Return the root mean square of d ln level / d place over soft-inside units that differ in one silicone."""
+    slopes = []
+    for i, j in combinations(range(len(table.names)), 2):
+        one, other = (table.inputs[row].place[0] for row in (i, j))
+        soft = table.classes[i] == table.classes[j] >= 2
+        if soft and table.designs[i] == table.designs[j] and np.count_nonzero(one != other) == 1:
+            slopes.append(math.log(table.levels[j] / table.levels[i]) / float(np.sum(other - one)))
+    return math.sqrt(float(np.mean(np.square(slopes)))) if slopes else math.nan
+
+
+def _lead(table: MeasuredTable, name: str, constants: Mapping[str, float], score: LeadScore) -> Lead:
+    every = np.concatenate([units.place.ravel() for units in table.inputs])
+    apart = np.concatenate([np.diff(units.place, axis=-1).ravel() for units in table.inputs])
     return Lead(
         model=name,
-        constants=dict(zip(model.names, constants.tolist(), strict=True)),
-        degrees_of_freedom=off.size - len(model.names),
-        sigma=float(np.sqrt(np.sum(off**2) / (off.size - 1))),
+        constants=constants,
+        degrees_of_freedom=len(table.names) - len(constants),
+        sigma=score.sigma,
         places=np.concatenate([_paper_place(units) for units in table.inputs]),
-        residuals=np.log(table.levels / model.levels(table, everyone)[0]),
-        moduli=(float(np.log(e.min())), float(np.log(e.max()))),
+        residuals=np.array(score.residuals),
+        silicones=(float(every.min()), float(every.max())),
+        contrast=float(np.max(np.abs(apart))),
+        common_slope=score.common_slope,
+        contrast_slope=score.contrast_slope,
     )
 
 
 def _paper_place(units: Units) -> np.ndarray:
     """Return the coordinates of a unit of the paper, (1, 12): a control's of unknown design are alike in both."""
-    counts = borders(units)[:1].sum(axis=-1)
-    ends = np.log(units.youngs_modulus[0, [0, -1]])
-    return np.array([[*[0.0] * LENGTHS, *ends, float(units.passes[0] * counts[0])]])
+    counted = borders(units)[:1].sum(axis=-1)
+    return np.array([[*[0.0] * LENGTHS, *units.place[0, [0, -1]], float(units.passes[0] * counted[0])]])
 
 
 def _of_lab(fit: LabFit) -> Lead:
     one = fit.model[fit.leads]
     paper = _of_paper(fit.moduli)
-    own = np.array([unit.place for unit in fit.measured])
-    ends = own[:, LENGTHS : LENGTHS + 2]
-    low, high = float(ends.min()), float(ends.max())
+    # Residuals of other labs and of the paper have those labs' circumstances in them: their units are places only.
+    known = [*fit.own, *(unit for unit in fit.measured if unit.lab is not None)]
+    places = np.array([unit.place for unit in known])
+    inside, outside = places[:, LENGTHS : LENGTHS + 2].T
+    silicones = [float(inside.min()), float(inside.max()), float(outside.min()), float(outside.max())]
+    contrast = float(np.max(np.abs(outside - inside)))
     if fit.include_paper_units:
-        low, high = min(low, paper.moduli[0]), max(high, paper.moduli[1])
+        silicones.extend(paper.silicones)
+        contrast = max(contrast, paper.contrast)
     return Lead(
         model=fit.leads,
         constants=one.constants,
         degrees_of_freedom=one.degrees_of_freedom,
         sigma=one.model_error,
-        # The paper's units count as places; their residuals belong to another lab.
-        places=np.concatenate([own, paper.places]) if fit.include_paper_units else own,
-        residuals=np.array([unit.residual for unit in fit.measured]),
-        moduli=(low, high),
+        places=np.concatenate([places, paper.places]) if fit.include_paper_units else places,
+        residuals=np.array([unit.residual for unit in fit.own]),
+        silicones=(min(silicones), max(silicones)),
+        contrast=contrast,
+        common_slope=paper.common_slope,
+        contrast_slope=paper.contrast_slope,
+        features=frozenset(name for unit in fit.measured for name in unit.features),
         covariance=np.array(one.covariance),
     )
 
 
-@cache
-def coverage(moduli: Moduli = "small-strain") -> int:
-    """Return how many of the nine measured units lie in the leading model's 80 % range, predicted without the unit."""
-    table, name = measured_table(moduli), _of_paper(moduli).model
-    count = 0
+def held(table: MeasuredTable, name: str) -> list[bool]:
+    """Return whether each measured unit lies in the model's 80 % range, predicted without the unit."""
+    inside = []
     for i in range(len(table.names)):
         lead, units = lead_on(table.without(i), name), table.inputs[i]
         model, own = COMPARED[name], np.array(list(lead.constants.values()))
         off = abs(float(np.log(table.levels[i]) - np.mean(model.logs(units, own))))
-        alone = Predictive(lead.degrees_of_freedom, np.zeros(()), np.array(lead.sigma), np.array(lead.sigma))
-        count += off <= float(np.log(alone.quantile(PERCENT[1] / 100)))
-    return count
+        inside.append(bool(off <= lead.sigma * special.stdtrit(lead.degrees_of_freedom, PERCENT[1] / 100)))
+    return inside

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
-from unitcad.errors import missing_extra
+from unitcad.extras import missing_extra
 
 try:
     import skfem

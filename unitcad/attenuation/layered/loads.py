@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy import special
 
 from unitcad.attenuation.layered.medium import MOST, finite
 from unitcad.attenuation.layered.propagation import Array, Material
 from unitcad.errors import Refusal, unknown_name
+from unitcad.lean_scipy import special
 
 
 def bessels(orders: tuple[int, ...], x: Any) -> Any:

@@ -23,11 +23,11 @@ from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import factorial2
 
 from unitcad.attenuation.layered.loads import UniformDisc, bessel_bounds, bessels, static_kernel
 from unitcad.attenuation.layered.medium import Stack
 from unitcad.attenuation.layered.propagation import Array, Material
+from unitcad.lean_scipy import special
 
 PHASE = 8.0 * np.pi
 """Of the fastest Bessel product over one panel."""
@@ -152,7 +152,7 @@ NODES = 16
 _AT, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
 _DEGREES = np.arange(2 * NODES, NODES, -1)
 """Of the waves: for each coefficient of the kernel the least degree that meets an error of the rule."""
-_ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
+_ODD_FACTORIALS = np.array([float(special.factorial2(2 * m - 1)) for m in _DEGREES])
 
 
 @cache  # not at import: the inverse makes OpenBLAS take its buffers

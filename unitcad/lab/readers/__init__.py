@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from unitcad import files
-from unitcad.errors import Refusal, UnitcadError, missing_extra
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.extras import missing_extra
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.units import TIMES, in_name, plain
 from unitcad.text import some

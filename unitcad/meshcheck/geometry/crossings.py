@@ -122,6 +122,7 @@ _AHEAD = 8  # blocks that wait for the second thread
 _BLOCK = 1 << 17  # pairs of faces decided together
 _PAIRS = 1 << 15  # of which so many are sieved together: enough to outweigh the calls, few enough for the cache
 _MOST_LOOKS, _LOOKS = 50_000_000, 100  # pairs looked at, in all and a face
+_MANY_TWICE = 1000  # duplicate faces of which all are compared
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
@@ -263,6 +264,8 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
     boxes = boxes_of(steps, *stored.T)
     order = box_order(boxes, frame)
     order = order[topology.stored_areas[order].any(axis=1)]
+    if len(topology.twice) > _MANY_TWICE:
+        order = order[~np.isin(order, _again(topology))]
     if len(order) < 2:
         return Crossings()
     tick()
@@ -271,7 +274,7 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
     crossings = Crossings(faces, contact, near)
     slabs, waiting = slabs_of(steps, *faces.corners), list[Pairs]()
     try:
-        pairs = meeting_pairs(boxes.take(order, axis=0), tick)
+        pairs = meeting_pairs(boxes.take(order, axis=0), tick, _fans(faces))
         for near in _ahead(lambda block: slabs.meeting(*_strangers(faces, *block)), pairs):
             waiting.append(near)
             if sum(len(some) for some, _ in waiting) > _BLOCK:
@@ -285,6 +288,13 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
         crossings.near.noted.clear()
     _leaning(crossings)
     return crossings
+
+
+def _again(topology: Topology) -> Ints:
+    """Return the faces that others repeat, but for one of each place: k copies of a face would make k^2 pairs."""
+    corners = np.sort(topology.mesh.faces[topology.twice], axis=1)
+    _, first = np.unique(corners, axis=0, return_index=True)
+    return np.delete(topology.twice, first)
 
 
 def _ahead(sieve: Callable[[Pairs], Pairs], blocks: Iterator[Pairs]) -> Iterator[Pairs]:
@@ -328,6 +338,23 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
         several,
         rounding,
     )
+
+
+def _fans(faces: Faces) -> Ints | None:
+    """Return for each face the vertex of the largest fan that it belongs to, -1 for none; None if there is no fan.
+
+    Faces round a safe vertex do not cross, and the boxes of all those of a fan of long faces meet.
+    """
+    count = np.bincount(faces.corners.ravel(), minlength=len(faces.vertices))
+    if count.max(initial=0) < _FAN:
+        return None
+    size = np.where(faces.safe >= 0, count.take(faces.safe, mode="clip"), 0)
+    largest = np.argmax(size, axis=0)
+    rows = np.arange(size.shape[1])
+    return np.where(size[largest, rows] >= _FAN, faces.safe[largest, rows], -1)
+
+
+_FAN = 64  # faces round a vertex
 
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> Pairs:

@@ -124,11 +124,11 @@ def _measured(slicer: Slicer, layer: Layer, piece: CrossSection, found: Disputed
 
 
 def deepest(area: CrossSection) -> tuple[float, Floats]:
-    """Return the radius, mm, and the middle (2,) of about the largest circle in an area, to 2 %."""
+    """Return the radius, mm, and the middle (2,) of about the largest circle in an area, to 2 % or rounding."""
     if area.is_empty():
         return 0.0, np.zeros(2)
     least, most, core = 0.0, float(np.sqrt(area.area())), area  # no circle inside is as large
-    while most - least > 0.02 * most:
+    while most - least > max(0.02 * most, _GRID):  # of a needle, no offset leaves anything
         smaller = area.offset(-(least + most) / 2)
         if smaller.is_empty():
             most = (least + most) / 2

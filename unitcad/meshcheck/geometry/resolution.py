@@ -18,17 +18,18 @@ class Resolution:
 
     `feature` is the least feature of the finest printer in the catalogue. `thin`, a tenth of it and of a usual `layer`,
     is a thickness that no printer makes and every slicer closes. `digit` is the last digit of usual G-code: what is
-    smaller cannot reach a printer.
+    smaller cannot reach a printer. `unit`: one mm of the part in mm of the file, 0.001 if it was drawn in metres.
     """
 
     feature: float = 0.2
     layer: float = 0.2
     thin: float = 0.02
     digit: float = 0.001
+    unit: float = 1.0
 
 
 def resolution_of(side: float) -> Resolution:
     """Return the sizes for a file by its largest side, mm, in metres if it was probably drawn in metres."""
     unit = 1e-3 if side < SMALL else 1.0
     usual = Resolution()
-    return Resolution(usual.feature * unit, usual.layer * unit, usual.thin * unit, usual.digit * unit)
+    return Resolution(usual.feature * unit, usual.layer * unit, usual.thin * unit, usual.digit * unit, unit)

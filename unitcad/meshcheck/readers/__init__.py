@@ -66,6 +66,17 @@ def kind_of(path: str) -> str:
     return {".stp": "step"}.get(suffix, suffix[1:])
 
 
+_OTHERS = {".glb": "glTF", ".gltf": "glTF", ".amf": "AMF", ".fbx": "FBX", ".dae": "COLLADA", ".x3d": "X3D"}
+_OTHERS |= {".igs": "IGES", ".iges": "IGES", ".blend": "Blender", ".f3d": "Fusion", ".fcstd": "FreeCAD"}
+
+
+def unknown(suffix: str) -> str:
+    """Say that no reader reads files of a suffix, and which formats slicers take."""
+    kind = _OTHERS.get(suffix.lower())
+    what = f"{kind} is not checked" if kind else f"suffix {suffix!r} is not a mesh format"
+    return f"{what}; export STL, 3MF or OBJ, which every slicer takes (checked: {', '.join(sorted(SUFFIXES))})"
+
+
 def reader_of(kind: str) -> Reader:
     """Return the reader of a format with one mesh; its module is loaded by the first file that needs it."""
     name = f"{_READ}{kind}"

@@ -20,15 +20,16 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS
+from OCP.TopoDS import TopoDS, TopoDS_Iterator
+from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Point
-from unitcad.meshcheck.readers.read_step import Measured
+from unitcad.meshcheck.readers.read_step import Measured, TooMany
 
 _ANGLE = 0.35
 """Largest angle between neighbouring facets of a curved face, radians."""
@@ -99,10 +100,12 @@ def measure(path: str) -> Measured | None:
     if reader.ReadFile(path) != IFSelect_RetDone or reader.TransferRoots() < 1:
         return None
     shape = reader.OneShape()
+    distinct = expect_countable(shape)
     volume, area = GProp_GProps(), GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, volume)
     BRepGProp.SurfaceProperties_s(shape, area)
-    valid, box = BRepCheck_Analyzer(shape).IsValid(), _box(shape)
+    valid = all(BRepCheck_Analyzer(distinct.FindKey(i)).IsValid() for i in range(1, distinct.Extent() + 1))
+    box = _box(shape)
     tolerance = max(_LEAST_MM, _PART * dist(*box)) if box else _LEAST_MM
     meshes: list[tuple[Floats, Ints]] = []
     explorer = TopExp_Explorer(shape, TopAbs_SOLID)
@@ -110,6 +113,45 @@ def measure(path: str) -> Measured | None:
         meshes.append(triangles_of(explorer.Current(), tolerance))
         explorer.Next()
     return Measured(valid, len(meshes), float(volume.Mass()), float(area.Mass()), box, tolerance, meshes)
+
+
+MOST_REPEATS, MOST_REPEATED_FACES = 2000, 30_000
+"""Bodies and assemblies that a STEP file may place again, and B-rep faces in them: OCCT takes some ms for ten faces."""
+
+
+def expect_countable(shape: Any) -> TopTools_IndexedMapOfShape:
+    """Return the bodies of a shape, each once, where it is defined.
+
+    A file of 40 kB whose assemblies have each other twice can place millions. Raises TooMany.
+    """
+    distinct, assemblies, faces = TopTools_IndexedMapOfShape(), TopTools_IndexedMapOfShape(), [0]
+    repeats = repeated = 0
+    left = [shape]
+    while left:
+        one = left.pop()
+        compound = one.ShapeType() == TopAbs_COMPOUND
+        known = assemblies if compound else distinct
+        before, number = known.Extent(), known.Add(one.Located(TopLoc_Location()))
+        if known.Extent() == before:
+            repeats, repeated = repeats + 1, repeated + (0 if compound else faces[number])
+        elif not compound:
+            faces.append(_faces(one))
+        below = TopoDS_Iterator(one)
+        while compound and below.More():
+            left.append(below.Value())
+            below.Next()
+        if repeats > MOST_REPEATS or repeated > MOST_REPEATED_FACES:
+            many = f"{MOST_REPEATS:,} times" if repeats > MOST_REPEATS else f"by {MOST_REPEATED_FACES:,} B-rep faces"
+            raise TooMany(f"assemblies that repeat their parts more than {many}")
+    return distinct
+
+
+def _faces(shape: Any) -> int:
+    explorer, count = TopExp_Explorer(shape, TopAbs_FACE), 0
+    while explorer.More():
+        count += 1
+        explorer.Next()
+    return count
 
 
 def _box(shape: Any) -> tuple[Point, Point] | None:

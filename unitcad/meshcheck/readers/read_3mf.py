@@ -8,15 +8,29 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import threemf_package as opc
+from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.threemf_model import read_model
 from unitcad.meshcheck.readers.threemf_package import Package, Relation
 from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.f_file import F011, Limits, OutOfTime, Unreadable
-from unitcad.meshcheck.rules.p_package import P001, P002, P003, P009, P011, P012, P014, P017, P019, P020
+from unitcad.meshcheck.rules.p_package import (
+    P001,
+    P002,
+    P003,
+    P009,
+    P011,
+    P012,
+    P014,
+    P017,
+    P019,
+    P020,
+    P021,
+    P022,
+)
 from unitcad.meshcheck.rules.registry import Rule
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
 from unitcad.text import some
@@ -28,6 +42,9 @@ SOLID = ("model", "solidsupport")
 
 def check_references(model: Model) -> None:
     """Add findings about references to the model. Objects in other parts are the package's business."""
+    for space, place in model.unchecked.items():
+        model.where = partial(_same, place)
+        model.add_lenient(P021, schema.UNCHECKED[space])
     for resource in model.resources.values():
         model.where = partial(_line_of, resource)
         if isinstance(resource, Object):
@@ -39,6 +56,10 @@ def check_references(model: Model) -> None:
         if not item.path:
             _used(model, item.object, item.rank, "a build item")
     model.where = Location
+
+
+def _same(place: Location) -> Location:
+    return place
 
 
 def _line_of(thing: Resource | Use) -> Location:
@@ -107,6 +128,29 @@ def _mesh(model: Model, resource: Object, mesh: Triangles) -> None:
         line = int(rows[same.argmax(), LINE])
         model.add(P017, f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice", line=line)
     _triangle_properties(model, resource, rows)
+    _beams(model, resource, n)
+
+
+def _beams(model: Model, resource: Object, n: int) -> None:
+    """Check the beams and balls on the `n` vertices of an object: beam lattice extension 1.2, chapter 2."""
+    who, beams, balls = f"object {resource.id}", resource.beams, np.array(resource.balls, np.int64).reshape(-1, 2)
+    for key in ("clippingmesh", "representationmesh"):
+        if key in resource.lattice:
+            _used(model, int(resource.lattice[key]), resource.rank - 1, f"{key} of {who}")
+    if resource.lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in resource.lattice:
+        model.add(P017, f"the beam lattice of {who} is clipped without a clippingmesh")
+    if (outside := balls[:, 0] >= n).any():
+        text = f"{counted(int(outside.sum()), 'ball')} of {who} with a vertex that is not there"
+        model.add(P011, text, line=int(balls[outside.argmax(), 1]))
+    for rule, wrong, what in (
+        (P011, (beams[:, :2] >= n).any(axis=1), "with a vertex that is not there"),
+        (P017, beams[:, 0] == beams[:, 1], "with one vertex twice"),
+        (P017, ~(beams[:, 2:4] > 0).all(axis=1), "with a radius that is not above 0"),
+    ):
+        if wrong.any():
+            model.add(rule, f"{counted(int(wrong.sum()), 'beam')} of {who} {what}", line=int(beams[wrong.argmax(), 4]))
+    for noun, indices, there in (("beam", resource.beam_sets, beams), ("ball", resource.ball_sets, balls)):
+        _in_range(model, max(indices, default=-1), len(there), f"an index of the {noun} sets of {who}")
 
 
 def _triangle_properties(model: Model, resource: Object, rows: Ints) -> None:
@@ -273,6 +317,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         if model_object.type == "other" and not model_object.components:
             findings.append(P012.finding(f"the build uses object {key[1]} of type other", severity=severity))
         elif model_object.mesh is not None:
+            _expect_planar(model_object, matrix, findings)
             unit_mm = UNITS_MM.get(models[key[0]].unit, 1.0)
             instances.append(Instance(key, model_object, model_object.mesh, matrix, unit_mm))
         for use in model_object.components:
@@ -287,6 +332,14 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         types = some(sorted(made))
         findings.append(P014.finding(f"the build has no object of type model, only of type {types}"))
     return instances
+
+
+def _expect_planar(placed: Object, matrix: Floats, findings: list[Finding]) -> None:
+    """Apply P022: slices stay in their plane (slice extension, 1.2)."""
+    flat = matrix[2, 2] == 1 and not matrix[:2, 2].any() and not matrix[2, :2].any()
+    if not flat and f"{schema.SLICE} slicestackid" in placed.attributes:
+        places = [Location(line=placed.line, object=str(placed.id))]
+        findings.append(P022.finding(f"the build tilts or stretches the slices of object {placed.id}", places=places))
 
 
 def _large(n: int) -> str:
@@ -329,9 +382,44 @@ def read_build(package: Package, limits: Limits) -> Build | None:
     if not models:
         return None
     root = next(iter(models.values()))
+    _drop_modifiers(package, root)
     if not root.items and root.has_build:
         package.findings.append(replace(P014.finding("the build has no item"), ends=True))
     return Build(root.unit, expand(models, root, limits, package.findings))
+
+
+_PRUSA = "metadata/slic3r_pe_model.config"
+
+
+def _drop_modifiers(package: Package, root: Model) -> None:
+    """Leave out the triangles that PrusaSlicer's settings call no part of a body: modifiers, supports, holes."""
+    config = package.xml(_PRUSA, P002) if _PRUSA in package.parts else None
+    for one in config.children if config is not None else ():
+        found = (
+            root.objects().get(int(one.attributes.get("id", ""))) if one.attributes.get("id", "").isdigit() else None
+        )
+        if one.name != "object" or found is None or found.mesh is None:
+            continue
+        body = np.ones(len(found.mesh.rows), bool)
+        for volume in one.children:
+            settings = {entry.attributes.get("key"): entry.attributes.get("value") for entry in volume.children}
+            ends = [volume.attributes.get(end, "") for end in ("firstid", "lastid")]
+            part = settings.get("volume_type", "ModelPart") == "ModelPart" and settings.get("modifier", "0") == "0"
+            if volume.name == "volume" and not part and all(end.isdigit() for end in ends):
+                body[int(ends[0]) : int(ends[1]) + 1] = False
+        if not body.all():
+            found.mesh = _part(found.mesh, body)
+
+
+def _part(mesh: Triangles, which: Bools) -> Triangles:
+    """Return some triangles of a mesh, without the vertices that only the others use."""
+    n = len(mesh.vertices)
+    used, kept = (np.isin(np.arange(n), mesh.rows[some, :3]) for some in (slice(None), which))
+    stay = kept | ~used
+    rows = mesh.rows[which]
+    inside = (rows[:, :3] < n).all(axis=1)  # others are findings
+    rows[inside, :3] = (np.cumsum(stay) - 1)[rows[inside, :3]]
+    return Triangles(mesh.vertices[stay], rows)
 
 
 def _models(package: Package, limits: Limits) -> dict[str, Model]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from unitcad.errors import Unfinished, UnitcadError, install_command
+from unitcad.errors import Unfinished, UnitcadError
+from unitcad.extras import install_command
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Point
 from unitcad.meshcheck.rules.f_file import F003, F011, F012
@@ -40,9 +42,44 @@ def step_bodies(path: Path, tolerance: float, seconds: float) -> list[tuple[str,
         raise UnitcadError(f"OCCT can't turn it into a mesh: {str(error)[:200]}") from error
 
 
+_ASIDE = re.compile(rb"'[^']*'?|/\*(?:.*?\*/|.*)", re.DOTALL)
+"""A text or a comment; one that does not end goes to the end of the file."""
+_SEVERAL = re.compile(rb"=\s*\(")
+SQUARES, SQUARES_A_BYTE = 2e9, 1e3
+"""Limit of the sum of squares that `expect_readable` takes: some 5 s of OCCT, and 2 s for each million bytes."""
+
+
+def expect_readable(data: bytes | memoryview) -> None:
+    """Raise `Unreadable` (F011) for a STEP file whose reading would take OCCT much longer than its size suggests.
+
+    OCCT keeps an entity that it does not understand as text. The time for that grows as the square of its references
+    and lists, so that half a million of them, in 1.5 MB, take ten minutes.
+    """
+    text = np.frombuffer(_ASIDE.sub(b"", bytes(data)), np.uint8)
+    ends = np.flatnonzero(text == ord(";"))
+    marks = np.flatnonzero((text == ord("#")) | (text == ord("(")))
+    counts = np.diff(np.searchsorted(marks, np.append(ends, len(text))), prepend=0).astype(float)
+    several = [found.start() for found in _SEVERAL.finditer(text.tobytes())]
+    counts[np.unique(np.searchsorted(ends, several))] *= _OF_SEVERAL
+    squares, limit = float(counts @ counts), SQUARES + SQUARES_A_BYTE * len(data)
+    if squares > limit:
+        raise F011.unreadable(
+            f"entities of up to {counts.max():,.0f} references and lists: the squares add up to {squares:.1e}, "
+            f"more than {limit:.1e}, the limit for a file of {len(data):,} bytes"
+        )
+
+
+_OF_SEVERAL = 3.0
+"""Weight of the parts of an entity of several types, whose time grows faster."""
+
+
 def missing() -> str:
     """Return the advice to install the reader of STEP; "" if STEP can be read here."""
     return "" if find_spec("OCP") else f"STEP needs the extra step: {install_command('step')}"
+
+
+class TooMany(UnitcadError):
+    """Bodies that a file places so often that there is neither time nor memory for all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +102,7 @@ def measured(path: Path, data: memoryview, seconds: float) -> Measured:
     """Return OCCT's measures of a STEP file. Raises `Unreadable` for a damaged file, and without OCP."""
     if b"END-ISO-10303-21" not in bytes(data[-2000:]):  # OCCT must not be handed a fragment
         raise F003.unreadable("the text ends before END-ISO-10303-21")
+    expect_readable(data)
     if lacking := missing():
         raise F012.unreadable(lacking)
     try:
@@ -78,6 +116,8 @@ def measured(path: Path, data: memoryview, seconds: float) -> Measured:
         raise F003.unreadable(f"the STEP reader died of the file ({error})") from error
     except ImportError as error:
         raise F012.unreadable(f"the kernel for STEP does not load ({str(error)[:200]})") from error
+    except TooMany as error:
+        raise F011.unreadable(str(error)) from error
     if found is None:
         raise F003.unreadable("the STEP file holds no shape that can be read")
     return found

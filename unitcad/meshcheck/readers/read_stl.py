@@ -59,6 +59,12 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
     if head[:5].lower() == b"solid":
         findings.append(F007.finding("the binary header starts with 'solid'"))
     count = int.from_bytes(data[80:84], "little")
+    if more := _attributes(data, count):
+        what = f"{counted(more, 'attribute byte')} after each facet: the size is 84 + {count} x (50 + {more})"
+        findings.append(F002.finding(f"{what}, and most programs read facets of 50 bytes"))
+        limits.check_faces(count)
+        records = np.frombuffer(data, np.dtype([*RECORD.descr, ("more", f"V{more}")]), count, 84)
+        return _mesh(records["corners"], records["normal"], findings)
     room, rest = divmod(size - 84, 50)
     promise = f"the header promises {counted(count, 'facet')}, the file"
     if count > room:
@@ -76,6 +82,15 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
     records = np.frombuffer(data, RECORD, facets, 84)
     deadline.tick()
     return _mesh(records["corners"], records["normal"], findings)
+
+
+def _attributes(data: memoryview, count: int) -> int:
+    """Return how many bytes of attributes follow each of `count` facets, as the facets' attribute counts say, or 0."""
+    more, rest = divmod(len(data) - 84 - 50 * count, max(count, 1))
+    if rest or not 0 < more < 1 << 16:
+        return 0
+    stated = np.ndarray(count, "<u2", data, 84 + 48, (50 + more,))
+    return more if (stated == more).all() else 0
 
 
 def _binary_size(data: memoryview) -> int:
@@ -155,7 +170,7 @@ def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
                 state.corners.clear()
                 return
             inside, state.solids, at = True, state.solids + 1, line_end
-        elif word == b"endsolid":
+        elif _END_SOLID.match(raw, at):
             inside, at = False, line_end
         elif word == b"facet":
             if not inside:
@@ -182,7 +197,8 @@ def _skip_blank(raw: bytes, at: int) -> int:
 
 
 _BLANK = re.compile(rb"[\s\x00]*")
-_END = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)\b")
+_END = re.compile(rb"(?im)^[ \t]*(?:end[ \t]*solid|solid)\b")
+_END_SOLID = re.compile(rb"(?i)end[ \t]*solid\b")  # some programs write two words
 
 
 def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadline) -> int:

@@ -200,7 +200,7 @@ class _Reader:
         self.rank = self.uses = 0
         self.resource: Resource | None = None
         self.names: set[str] = set()
-        self.numbers, self.indices = array("d"), array("q")
+        self.numbers, self.indices, self.beams, self.radius = array("d"), array("q"), array("d"), "1"
         self.vertices: list[Floats] = []
         self.rows: list[Ints] = []
 
@@ -223,9 +223,11 @@ class _Reader:
         attributes = dict(zip(flat[::2], flat[1::2], strict=True))
         rules = schema.ELEMENTS.get(space, {}).get(local)
         self._child(space, local, rules)
+        if space in schema.UNCHECKED:
+            self.model.unchecked.setdefault(space, self._where())
+        if space in _SHAPES and isinstance(self.resource, Object):
+            self.resource.other_shape = True
         if rules is None:
-            if space in _SHAPES and isinstance(self.resource, Object):
-                self.resource.other_shape = True
             if self.stack[-1].name == "resources" and schema.resource_id(attributes.get("id", "")):
                 self._once(int(attributes["id"]))
                 self.model.foreign.add(int(attributes["id"]))
@@ -258,7 +260,8 @@ class _Reader:
             self._flush()
             if isinstance(self.resource, Object):
                 self.resource.mesh = Triangles(np.concatenate(self.vertices), np.concatenate(self.rows))
-            self.vertices, self.rows = [], []
+                self.resource.beams = np.array(self.beams).reshape(-1, 5)
+            self.vertices, self.rows, self.beams = [], [], array("d")
         elif done.name == "object" and isinstance(self.resource, Object):
             shapes = (self.resource.mesh is not None) + bool(self.resource.components)
             if not shapes and not self.resource.other_shape:
@@ -290,7 +293,8 @@ class _Reader:
             if parent.counts[name] == most + 1:
                 self.model.add(P017, f"<{parent.name}> has <{local}> more than once")
             if parent.rules.ordered and place < parent.last:
-                self.model.add(P017, f"<{local}> is out of order in <{parent.name}>")
+                add = self.model.add_lenient if local == "metadata" else self.model.add
+                add(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
         if rules is None or parent.name != "resources":
@@ -315,7 +319,7 @@ class _Reader:
             elif name.startswith("http://www.w3.org/XML/1998/namespace ") and local != "model":
                 self.model.add(P017, f"attribute xml:lang in <{local}>")
             elif " " not in name:
-                self.model.add_lenient(P017, f"unknown attribute {name!r} of <{local}>")
+                self.model.add_lenient(P017, f"unknown attribute {name!r} of <{local}>", "info")
             elif not rules.open_ and " " in name:
                 self.model.add(P017, f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
         return good
@@ -328,12 +332,32 @@ class _Reader:
             if take is not None:
                 take(attributes)
                 return
-        if "id" in attributes and parent == "resources":
+        if space in (schema.BEAM, schema.BALLS):
+            self._take_lattice(local, attributes)
+        elif "id" in attributes and parent == "resources":
             self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
         elif self.resource is not None and not isinstance(self.resource, Object):
             self.resource.members.append({"": local, **attributes})
             if len(self.resource.members) > self.limits.max_faces:
                 raise F011.unreadable("more properties than --max-faces")
+
+    def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
+        if local == "beamlattice":
+            self.radius = attributes["radius"]
+            if isinstance(self.resource, Object):
+                self.resource.lattice = attributes
+        elif local == "beam":
+            first = attributes.get("r1", self.radius)
+            ends = attributes["v1"], attributes["v2"], first, attributes.get("r2", first)
+            self.beams.extend([*map(float, ends), self.parser.CurrentLineNumber])
+            self._count_faces(1)
+        elif local == "ref" and isinstance(self.resource, Object):
+            self.resource.beam_sets.append(int(attributes["index"]))
+        elif local == "ballref" and isinstance(self.resource, Object):
+            self.resource.ball_sets.append(int(attributes["index"]))
+        elif local == "ball" and isinstance(self.resource, Object):
+            self.resource.balls.append((int(attributes["vindex"]), self.parser.CurrentLineNumber))
+            self._count_faces(1)
 
     def _once(self, id_: int) -> None:
         if id_ in self.model.resources or id_ in self.model.foreign:

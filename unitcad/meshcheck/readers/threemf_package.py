@@ -10,6 +10,7 @@ import codecs
 import io
 import posixpath
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -20,7 +21,7 @@ from xml.parsers import expat
 
 from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted
-from unitcad.meshcheck.rules.f_file import F003, F009, F011, Deadline, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F003, F006, F009, F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P006, P007, P008
 from unitcad.meshcheck.rules.registry import Rule
 
@@ -116,6 +117,7 @@ PRESERVE = _PACKAGE + "relationships/mustpreserve"
 KNOWN = {START, TEXTURE, TICKET, THUMBNAIL, PROPERTIES, PRESERVE}
 MODEL_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodel+xml"
 RELS_TYPE = "application/vnd.openxmlformats-package.relationships+xml"
+_END_RECORD = 22 + (1 << 16)  # bytes of the largest end record, with its comment
 _FREE = 1_000_000  # bytes that may inflate at any ratio
 _MEDIA = re.compile(r"^[!#$%&'*+\-.^_`|~\w]+/[!#$%&'*+\-.^_`|~\w]+(\s*;.*)?$", re.ASCII)
 _ODD = re.compile(r"[\\\x00-\x1f\x7f]|%2f|%5c", re.IGNORECASE)
@@ -157,9 +159,8 @@ class Package:
         """Return a part's bytes, at most so many. Raises `Unreadable`."""
         info = self.parts[name]
         place = [Location(part=info.filename)]
-        if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
-            raise P008.unreadable(f"{info.filename} is {what}", places=place)
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise P008.unreadable(f"{info.filename} is packed with method {info.compress_type}", places=place)
         if most is not None and info.file_size > most:
             raise F011.unreadable(f"{info.filename}: more than {most} bytes")
         self.spent += info.file_size
@@ -248,8 +249,13 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise F003.unreadable(f"the zip cannot be read: {error}") from error
     package = Package(archive, limits, deadline, strict=strict)
     entries = archive.infolist()
+    if why := _contradicts(data, archive):
+        raise F003.unreadable(f"the zip's end record contradicts its directory: {why}")
     if len(entries) > limits.max_entries:
         raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
+    end = _end_record(data)
+    if more := len(data) - end - 22 - int.from_bytes(data[end + 20 : end + 22], "little"):
+        package.add(F006, f"{counted(more, 'byte')} after the end of the zip")
     bombs = []
     for info in entries:
         name = info.filename
@@ -258,6 +264,8 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
             package.add(P005, f"{info.filename!r} is no plain relative name", info.filename)
         if not info.filename or info.is_dir():
             continue
+        if info.flag_bits & 1:
+            raise P008.unreadable(f"{info.filename} is encrypted", places=[Location(part=info.filename)])
         key = unquote(info.filename).lower().lstrip("/")
         if key in package.parts:
             package.add(P004, f"{info.filename!r} is there twice", info.filename)
@@ -269,6 +277,23 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
         raise Unreadable(*package.findings, P008.finding(bombs[0], len(bombs)))
     _content_types(package)
     return package
+
+
+def _end_record(data: memoryview) -> int:
+    """Return the place of the end record, which `zipfile` has found before."""
+    return max(len(data) - _END_RECORD, 0) + bytes(data[-_END_RECORD:]).rfind(b"PK\x05\x06")
+
+
+def _contradicts(data: memoryview, archive: zipfile.ZipFile) -> str | None:
+    """Return how the end record differs from the directory that was read; None if it does not, or for a zip64."""
+    at = _end_record(data)
+    on_disk, total, size, offset = struct.unpack_from("<HHII", data, at + 8)
+    if 0xFFFF in (on_disk, total) or 0xFFFFFFFF in (size, offset):
+        return None
+    there = len(archive.infolist())
+    if not on_disk == total == there:
+        return f"{counted(total, 'entry', 'entries')}, {on_disk} on this disk, and {there} in the directory"
+    return None if offset == archive.start_dir else f"it begins at byte {offset}, and lies at {archive.start_dir}"
 
 
 def _content_types(package: Package) -> None:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location
 from unitcad.meshcheck.rules.registry import Rule
@@ -145,10 +147,51 @@ def _material() -> dict[str, ElementSchema]:
     }
 
 
+def _beams() -> dict[str, ElementSchema]:
+    clip = {"clippingmode": one_of("none", "inside", "outside"), "clippingmesh": resource_id}
+    ball = {"ballmode": text, "ballradius": number}
+    shape = clip | ball | {"representationmesh": resource_id, "cap": text, "pid": resource_id, "pindex": index}
+    ends = {"r1": number, "r2": number, "p1": index, "p2": index, "pid": resource_id, "cap1": text, "cap2": text}
+    sets = {"name": text, "identifier": text, "pid": resource_id, "pindex": index}
+    return {
+        "beamlattice": ElementSchema(
+            {"radius": number, "minlength": number},
+            shape | {"precision": number},
+            (("beams", 1, 1), ("beamsets", 0, 1)),
+        ),
+        "beams": ElementSchema(children=(("beam", 0, _MANY),)),
+        "beam": ElementSchema({"v1": index, "v2": index}, ends),
+        "beamsets": ElementSchema(children=(("beamset", 0, _MANY),)),
+        "beamset": ElementSchema({}, sets, (("ref", 0, _MANY),)),
+        "ref": ElementSchema({"index": index}),
+    }
+
+
+def _balls() -> dict[str, ElementSchema]:
+    return {
+        "balls": ElementSchema(children=(("ball", 0, _MANY),)),
+        "ball": ElementSchema({"vindex": index}, {"r": number, "p": index, "pid": resource_id}),
+        "ballref": ElementSchema({"index": index}),
+    }
+
+
 ELEMENTS: dict[str, dict[str, ElementSchema]] = {
     CORE: _core(),
     MATERIAL: _material(),
+    BEAM: _beams(),
+    BALLS: _balls(),
 }
+UNCHECKED = {
+    BEAM: "a beam lattice: its indices and radii are checked, its shape is not",
+    SLICE: "slices are not checked",
+    BALLS: "the balls of a beam lattice: their vertices are checked, their shape is not",
+    BOOLEAN: "boolean operations are not checked",
+    DISPLACEMENT: "displacement is not checked",
+    OLD_DISPLACEMENT: "displacement is not checked",
+    VOLUMETRIC: "volumetric content is not checked",
+    IMPLICIT: "implicit content is not checked",
+}
+"""Content that a mesh check does not judge, by namespace."""
 
 
 LINE = 7  # column of a triangle's line
@@ -188,12 +231,21 @@ class Triangles:
 
 @dataclass
 class Object(Resource):
-    """An object: a mesh or components."""
+    """An object: a mesh or components.
+
+    `beams` (b, 5) are v1, v2, r1, r2 and the line of the beams on the mesh's vertices, `balls` (vertex, line) pairs.
+    `beam_sets` and `ball_sets` are indices of beams and balls, `lattice` the attributes of the lattice.
+    """
 
     type: str = "model"
     mesh: Triangles | None = None
     components: list[Use] = field(default_factory=list)
     other_shape: bool = False
+    beams: Floats = field(default_factory=lambda: np.empty((0, 5)))
+    beam_sets: list[int] = field(default_factory=list)
+    balls: list[tuple[int, int]] = field(default_factory=list)
+    ball_sets: list[int] = field(default_factory=list)
+    lattice: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -209,6 +261,7 @@ class Model:
     findings: list[Finding] = field(default_factory=list)
     has_build: bool = False
     strict: bool = False
+    unchecked: dict[str, Location] = field(default_factory=dict)
     where: Callable[[], Location] = Location
     _noted: dict[tuple[str, str | None], int] = field(default_factory=dict)
 
@@ -221,9 +274,9 @@ class Model:
             place = place if line is None else replace(place, line=line)
             self.findings.append(rule.finding(message, 1, [place], severity))
 
-    def add_lenient(self, rule: Rule, message: str) -> None:
-        """Add a finding that real programs' files have: a warning unless the model is checked strictly."""
-        self.add(rule, message, None if self.strict else "warning")
+    def add_lenient(self, rule: Rule, message: str, otherwise: str = "warning") -> None:
+        """Add a finding that real programs' files have: of severity `otherwise` unless the model is checked strictly."""
+        self.add(rule, message, None if self.strict else otherwise)
 
     def objects(self) -> dict[int, Object]:
         """Return the object resources by id."""

@@ -7,10 +7,11 @@ directions; so bevels and wedges, tapered edges and the strips between engraved 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.components import components
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
 from unitcad.meshcheck.geometry.rays import SLACK, Rays, cast, lying
@@ -77,6 +78,7 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
     through = thin[marked[rays.across[thin]]]
     wall = components(n, patch[owner[through]], patch[rays.across[through]])
     thinnest: dict[int, tuple[float, Location]] = {}
+    sides: dict[int, list[Ints]] = {}
     for label in np.unique(group):
         mine = thin[group == label]
         of = owner[mine]
@@ -84,11 +86,15 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
         if _reach(cloud, bool(level[of[0]])) < upright:
             continue
         worst = mine[np.argmin(thickness[mine])]
-        first, region = int(topology.kept[owner[worst]]), topology.kept[np.unique(of)]
-        place = Location(face=first, xyz=point(points[worst]), region=region)
-        here = (float(thickness[worst]), place)
-        thinnest[int(wall[label])] = min(here, thinnest.get(int(wall[label]), here), key=lambda item: item[0])
-    return sorted(thinnest.values(), key=lambda item: item[0])
+        here = (float(thickness[worst]), Location(face=int(topology.kept[owner[worst]]), xyz=point(points[worst])))
+        one = int(wall[label])
+        thinnest[one] = min(here, thinnest.get(one, here), key=lambda item: item[0])
+        sides.setdefault(one, []).append(of)
+    found = [
+        (least, replace(place, region=topology.kept[np.unique(np.concatenate(sides[one]))]))
+        for one, (least, place) in thinnest.items()
+    ]
+    return sorted(found, key=lambda item: item[0])
 
 
 def _reach(cloud: Floats, lying: bool) -> float:

@@ -24,8 +24,9 @@ F001 = Rule("""
 
 F002 = Rule("""
     F002 error: facet count does not match the size
-    The count in a binary STL's header asks for more or fewer 50-byte records than the file holds, or a PLY or an OFF
-    promises more elements than it has. A reader that trusts either number reads rubbish.
+    The count in a binary STL's header asks for more or fewer 50-byte records than the file holds, bytes of attributes
+    follow each facet, or a PLY or an OFF promises more elements than it has. A reader that trusts either number reads
+    rubbish.
     Example: A binary STL of 12 facets was cut after 400 bytes, which have room for 6.
     Fix: Copy or export the file again; a file cut short in transfer cannot be repaired.
 """)
@@ -33,7 +34,7 @@ F002 = Rule("""
 F003 = Rule("""
     F003 error: truncated text, XML or zip
     The text ends inside a facet or before endsolid, the XML is not well formed or ends early, or the zip directory is
-    missing or damaged.
+    missing, damaged or another one than its end record says.
     Example: The last line of a text STL is `vertex 0 0`.
     Fix: Copy or export the file again.
 """)
@@ -55,8 +56,8 @@ F005 = Rule("""
 
 F006 = Rule("""
     F006 warning: trailing bytes
-    Bytes follow the last facet, endsolid, or the last element that a PLY or OFF promises. Readers ignore them, or count
-    facets from the size and disagree.
+    Bytes follow the last facet, endsolid, the zip of a 3MF, or the last element that a PLY or OFF promises. Readers
+    ignore them, or count facets from the size and disagree.
     Example: A binary STL has 16 bytes of a checksum after its last facet.
     Fix: Export again, or cut the file after its last facet.
 """)

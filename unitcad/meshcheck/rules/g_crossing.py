@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from unitcad.geometry.arrays import Ints, among
-from unitcad.meshcheck.findings import Finding, Location, counted, most_locations, point
+from unitcad.meshcheck.findings import Finding, Location, most_locations, point, tally
 from unitcad.meshcheck.geometry.crossings import Faces, join_pairs
 from unitcad.meshcheck.geometry.mesh import float32_step
 from unitcad.meshcheck.geometry.predicates import common_point
@@ -75,7 +76,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     if crossings.stopped is not None:
         raise crossings.stopped
     placed, through = part.placed, part.through
-    text = f"{counted(len(through), 'edge')} at which a shell passes through itself"
+    text = f"{tally(len(through), 'edge')} at which a shell passes through itself"
     places = at_edges(placed.mesh.vertices, placed.edges, placed.kept, through)
     yield from by_layers(part, G008, text, len(through), places)
     if part.disputed.stopped is not None:
@@ -87,15 +88,15 @@ def _pairs(part: Inspection, faces: Faces) -> Iterator[Finding]:
     crossings, places = part.crossings, partial(_places, faces)
     crossing = join_pairs(crossings.crossing) if part.strict else crossings.deep
     twice, thin, other = crossings.kinds(part.topology)
-    text = f"{counted(len(crossing), 'pair')} of faces that cross"
+    text = f"{tally(len(crossing), 'pair')} of faces that cross"
     yield from by_layers(part, G001, text, len(crossing), places(crossing))
     if len(other):
-        text = f"{counted(len(other), 'pair')} of faces that overlap in one plane"
+        text = f"{tally(len(other), 'pair')} of faces that overlap in one plane"
         yield G004.finding(text, len(other), places(other))
-    text = f"{counted(len(twice), 'pair')} of faces of one shell that overlap in one plane and look the same way"
+    text = f"{tally(len(twice), 'pair')} of faces of one shell that overlap in one plane and look the same way"
     by = by_width if part.disputed.thick == 0 and not part.disputed.shows else by_layers
     yield from by(part, G008, text, len(twice), places(twice))
-    text = f"{counted(len(thin), 'pair')} of faces in one plane with nothing between them"
+    text = f"{tally(len(thin), 'pair')} of faces in one plane with nothing between them"
     yield from by_width(part, G009, text, len(thin), places(thin))
 
 
@@ -111,7 +112,17 @@ def _touching(part: Inspection, faces: Faces) -> Iterator[Finding]:
     if not n:
         return
     some = " among those compared" if crossings.contact.full or crossings.near.full else ""
-    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, _places(faces, pairs[first]))
+    yield G003.finding(f"{tally(n, 'pair')} of shells that touch{some}", n, _between(part, faces, pairs[first]))
+
+
+def _between(part: Inspection, faces: Faces, pairs: Ints) -> Iterator[Location]:
+    """Return the places of pairs, one for two shells, each with the middle of the room that their boxes share."""
+    topology = part.topology
+    shell = dict(zip(faces.original[pairs].ravel().tolist(), faces.shell[pairs].ravel().tolist(), strict=True))
+    for place in _places(faces, pairs):
+        both = [shell[face] for face in place.faces]
+        middle = (topology.low[both].max(axis=0) + topology.high[both].min(axis=0)) / 2
+        yield replace(place, centre=point(middle))
 
 
 def _places(faces: Faces, pairs: Ints) -> list[Location]:

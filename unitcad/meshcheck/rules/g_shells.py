@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.meshcheck.findings import Finding, Location, counted, number, point
+from unitcad.meshcheck.findings import Finding, Location, counted, number, point, tally
 from unitcad.meshcheck.geometry.predicates import without_area
 from unitcad.meshcheck.geometry.resolution import Resolution
 from unitcad.meshcheck.geometry.topology import Topology, diagonals
@@ -35,6 +35,7 @@ G005 = Rule("""
 G006 = Rule("""
     G006 warning: closed cavity
     A shell lies inside another one and faces inwards: a hollow with no way in or out. Resin and support stay inside.
+    Information if it is a slit, thinner than 0.2 mm on average: designers use slits to add perimeters.
     Example: A box has a bubble inside.
     Fix: Open it, or fill it.
 """)
@@ -42,7 +43,8 @@ G006 = Rule("""
 G007 = Rule("""
     G007 error: volume about zero
     A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness. Faces without an
-    area are T010 alone. A warning, unless --strict is given, if the sheet is narrower than 0.2 mm on average.
+    area are T010 alone. A warning, unless --strict is given, if the sheet is narrower than 0.2 mm on average and other
+    shells have a volume.
     Example: A sheet is drawn as two faces back to back.
     Fix: Give it thickness.
 """)
@@ -80,12 +82,13 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
         worst = which[np.argmax(nesting.area[which])]
         text = f"volume {number(volumes[worst], 3)} mm3 over {number(nesting.area[worst], 3)} mm2 of surface"
         wide = nesting.area[which] / 2 / diagonals(low[which], high[which])  # of each of its two sides
-        severity = None if (wide >= topology.resolution.feature).any() or part.strict else "warning"
+        lost = nesting.flat.all() or (wide >= topology.resolution.feature).any()
+        severity = None if lost or part.strict else "warning"
         yield G007.finding(text, len(which), (_where(topology, i) for i in which.tolist()), severity)
     sound = nesting.sound
     yield from specks(low, high, sound & (volumes > 0))
     pairs = nesting.overlaps
-    text = f"{counted(len(pairs), 'pair')} of shells that share volume"
+    text = f"{tally(len(pairs), 'pair')} of shells that share volume"
     yield from by_layers(part, G002, text, len(pairs), (_where(topology, *pair) for pair in pairs))
     if nesting.stopped is not None:
         raise nesting.stopped
@@ -96,7 +99,9 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     ):
         if len(which) and not (rule is T008 and n == 1 and part.crossings.crossed):
             places = (_where(topology, i) for i in which.tolist())
-            yield rule.finding(counted(len(which), one, many), len(which), places)
+            thick = 2 * -volumes[which] / nesting.area[which]
+            shows = rule is T008 or (thick >= topology.resolution.feature).any()
+            yield rule.finding(tally(len(which), one, many), len(which), places, None if shows else "info")
 
 
 def _without_area(topology: Topology, asked: Bools) -> Bools:
@@ -121,7 +126,7 @@ def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
     if not len(tiny) or side.max() < BODY:
         return []
     places = [Location(xyz=point(middle)) for middle in (low[tiny] + high[tiny]) / 2]
-    text = f"{counted(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
+    text = f"{tally(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
     return [G010.finding(text, len(tiny), places)]
 
 

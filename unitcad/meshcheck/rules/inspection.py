@@ -163,7 +163,7 @@ class Options:
     `shells`: the number of shells expected (G005). `strict`: crossings too shallow for a printer are errors too.
     `strict_3mf`: content that the 3MF specification forbids and common programs write is an error, not a warning.
     `unwanted`: prefixes of codes that no select brings back. `draw`: keep the meshes with the report, and more places,
-    for pictures.
+    for pictures. `every_place`: keep more places, for a baseline.
     """
 
     select: tuple[str, ...] = ()
@@ -176,6 +176,7 @@ class Options:
     limits: Limits = field(default_factory=Limits)
     unwanted: tuple[str, ...] = ()
     draw: bool = False
+    every_place: bool = False
 
     def wants(self, code: str) -> bool:
         """Return whether findings of `code` are reported, unless they ended the check: those always are."""

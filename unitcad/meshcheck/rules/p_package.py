@@ -1,4 +1,4 @@
-"""3MF packages, P001 to P020: the reader's findings before there is a mesh."""
+"""3MF packages, P001 to P022: the reader's findings before there is a mesh."""
 
 from __future__ import annotations
 
@@ -130,8 +130,8 @@ P016 = Rule("""
 P017 = Rule("""
     P017 error: against the schema
     An element or attribute is missing, unknown, repeated, out of order, of the wrong type, or forbidden (xml:space, xsi
-    attributes). An unknown attribute without a prefix and metadata of one name are warnings, unless --3mf-strict is
-    given, since common programs write such files.
+    attributes). Unless --3mf-strict is given, an unknown attribute without a prefix is information, and metadata of one
+    name or behind the resources a warning, since common programs write such files.
     Example: A `<triangle>` has v1 and v2, and no v3.
     Fix: Write the element by its 3MF schema.
 """)
@@ -158,4 +158,20 @@ P020 = Rule("""
     More than one thumbnail or print ticket for one part, or one that does not fit its relationship.
     Example: _rels/.rels has two relationships of type thumbnail.
     Fix: Keep one.
+""")
+
+P021 = Rule("""
+    P021 error: content that is not checked
+    The model has a beam lattice, slices, or boolean, displaced, volumetric or implicit content. The rules judge meshes
+    only, so the file may have faults that they do not see. A warning, unless --3mf-strict is given.
+    Example: An object has a `<b:beamlattice>`.
+    Fix: Check such content with a program that knows it, or export it as a mesh.
+""")
+
+P022 = Rule("""
+    P022 error: slices out of their plane
+    A transform tilts an object of slices, or stretches it along z: the slice extension (1.2) allows shifts, and turns and
+    scales in the plane only.
+    Example: The item of an object with `s:slicestackid` is turned about x.
+    Fix: Slice the object in the attitude of the build.
 """)

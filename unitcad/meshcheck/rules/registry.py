@@ -13,7 +13,9 @@ from types import ModuleType
 
 from unitcad.errors import Refusal
 from unitcad.meshcheck import rules as folder
-from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, Unreadable, most_locations
+from unitcad.meshcheck.findings import MOST_COUNTED, SEVERITIES, Finding, Location, Unreadable, most_locations
+
+_LONGEST = 400  # characters of a message
 
 
 class Rule:
@@ -36,7 +38,9 @@ class Rule:
     ) -> Finding:
         """Make a finding, with the rule's severity unless another one is given."""
         kept = tuple(islice(places, most_locations()))
-        return Finding(self.code, severity or self.severity, message, int(count), kept)
+        if len(message) > _LONGEST:  # a name in it may have megabytes
+            message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 2 :]}"
+        return Finding(self.code, severity or self.severity, message, min(int(count), MOST_COUNTED), kept)
 
     def unreadable(
         self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None

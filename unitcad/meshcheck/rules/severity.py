@@ -18,23 +18,30 @@ def by_layers(part: Inspection, rule: Rule, text: str, n: int, places: Iterable[
     """
     if not n or not (part.disputed.thick or part.disputed.shows or part.strict):
         return
-    severity = None if part.disputed.shows or part.strict else _small(part, part.disputed.thick)
-    yield rule.finding(f"{text}{in_layers(part.disputed)}", n, _with_layer(places, part.disputed), severity)
+    severity = (
+        None if part.disputed.shows or part.strict else _small(part.disputed.thick, part.topology.resolution.digit)
+    )
+    yield rule.finding(
+        f"{text}{in_layers(part.disputed, part.topology.resolution.unit)}",
+        n,
+        _with_layer(places, part.disputed),
+        severity,
+    )
 
 
-def _small(part: Inspection, size: float) -> str:
-    return "warning" if size >= part.topology.resolution.digit else "info"
+def _small(size: float, least: float) -> str:
+    return "warning" if size >= least else "info"
 
 
-def in_layers(disputed: Disputed) -> str:
-    """Say how far fill rules differ, and where."""
-    layer = disputed.layer
+def in_layers(disputed: Disputed, unit: float) -> str:
+    """Say how far fill rules differ, and where; `unit`: of the file, m if it was probably drawn in metres."""
+    layer, metres = disputed.layer, ", read in metres" if unit != 1.0 else ""
     if not disputed.shows:
-        return f", {number(disputed.thick, 2)} mm deep at most"
+        return f", {number(disputed.thick / unit, 2)} mm deep at most{metres}"
     if layer is None:
         return ""
     place = f"{'xyz'[layer.axis]} = {number(layer.height, 4)}"
-    return f"; layers differ by up to {number(disputed.area, 2)} mm2 between fill rules, worst at {place}"
+    return f"; layers differ by up to {number(disputed.area / unit**2, 2)} mm2 between fill rules{metres}, worst at {place}"
 
 
 def _with_layer(places: Iterable[Location], disputed: Disputed) -> Iterator[Location]:
@@ -56,5 +63,5 @@ def by_width(
     if not (sheets.wide or sheets.wall or part.strict):
         return
     fate = "" if sheets.wall else "; slicers fill it" if sheets.gap else f", {number(sheets.wide, 2)} mm wide at most"
-    severity = None if sheets.wall or part.strict else least or _small(part, sheets.wide)
+    severity = None if sheets.wall or part.strict else least or _small(sheets.wide, part.topology.resolution.thin)
     yield rule.finding(f"{text}{fate}", n, places, severity)

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.meshcheck.findings import Finding, Location, counted, number, point
+from unitcad.meshcheck.findings import Finding, Location, number, point, tally
 from unitcad.meshcheck.geometry.mesh import Mesh, float32_step, float32_steps
 from unitcad.meshcheck.geometry.predicates import without_area
 from unitcad.meshcheck.geometry.resolution import STEPS
@@ -132,12 +132,12 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     yield from _many_faces(topology)
     yield from _thin(topology)
     if n := len(topology.pinched):
-        text = counted(n, "pinch vertex", "pinch vertices")
+        text = tally(n, "pinch vertex", "pinch vertices")
         yield T004.finding(text, n, (Location(xyz=point(xyz)) for xyz in mesh.vertices[topology.pinched]))
     twice = topology.twice[~without_area(mesh.vertices[mesh.faces[topology.twice]])]  # the others are T010
     n = len(twice)
     yield from by_width(
-        part, T009, counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, twice), "warning"
+        part, T009, tally(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, twice), "warning"
     )
     more = " along which more faces run one way than the other"
     yield from _with_flaps(topology, T007, "edge", topology.unbalanced, more)
@@ -145,7 +145,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
 
 def unreferenced(n: int) -> Finding:
     """Make the finding T012 about n vertices, for a reader too, which leaves them out."""
-    return T012.finding(f"{counted(n, 'vertex', 'vertices')} that no face uses", n)
+    return T012.finding(f"{tally(n, 'vertex', 'vertices')} that no face uses", n)
 
 
 def _open_edges(topology: Topology) -> Iterator[Finding]:
@@ -154,14 +154,12 @@ def _open_edges(topology: Topology) -> Iterator[Finding]:
     if opened is None:
         return
     if n := len(opened.shut):
-        text = f"{counted(n, 'open edge')} that welding closes, {number(opened.gap, 2)} mm apart at most"
+        text = f"{tally(n, 'open edge')} that welding closes, {number(opened.gap, 2)} mm apart at most"
         places = at_edges(mesh.vertices, opened.edges, opened.kept, opened.shut)
         yield T006.finding(text, n, places, None if opened.gap > STEPS * float32_step(mesh.vertices) else "info")
     if len(crack := opened.left[opened.crack]):
         places = at_edges(mesh.vertices, topology.edges, topology.kept, crack)
-        text = (
-            f"{counted(len(crack), 'open edge')} of a crack {number(opened.wide, 2)} mm wide at most; slicers close it"
-        )
+        text = f"{tally(len(crack), 'open edge')} of a crack {number(opened.wide, 2)} mm wide at most; slicers close it"
         yield T005.finding(text, len(crack), places)
     left = opened.left[~opened.crack]
     yield from _with_flaps(topology, T001, "boundary edge", left)
@@ -175,7 +173,7 @@ def _with_flaps(topology: Topology, rule: Rule, noun: str, which: Ints, more: st
     for some, severity, whose in ((~small, None, ""), (small, "warning", " of patches that no printer shows")):
         if n := int(some.sum()):
             places = at_edges(topology.mesh.vertices, topology.edges, topology.kept, which[some])
-            yield rule.finding(f"{counted(n, noun)}{more}{whose}", n, places, severity)
+            yield rule.finding(f"{tally(n, noun)}{more}{whose}", n, places, severity)
 
 
 def _many_faces(topology: Topology) -> Iterator[Finding]:
@@ -184,7 +182,7 @@ def _many_faces(topology: Topology) -> Iterator[Finding]:
     yield from _with_flaps(topology, T002, "edge", odd, " with more than two faces, an odd number")
     if n := len(even):
         places = at_edges(topology.mesh.vertices, topology.edges, topology.kept, even)
-        yield T003.finding(f"{counted(n, 'edge')} with more than two faces, an even number", n, places)
+        yield T003.finding(f"{tally(n, 'edge')} with more than two faces, an even number", n, places)
 
 
 def _thin(topology: Topology) -> Iterator[Finding]:
@@ -206,12 +204,12 @@ def _thin(topology: Topology) -> Iterator[Finding]:
     n = len(repeated) + len(lines)
     if n:
         places = (Location(face=int(i)) for i in repeated)
-        text = f"{counted(n, 'face')} without area"
+        text = f"{tally(n, 'face')} without area"
         yield T010.finding(text, n, chain(places, at_faces(vertices, faces, kept, lines)))
     height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
     thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
     if len(thin):
-        yield T011.finding(counted(len(thin), "sliver"), len(thin), at_faces(vertices, faces, kept, thin))
+        yield T011.finding(tally(len(thin), "sliver"), len(thin), at_faces(vertices, faces, kept, thin))
 
 
 def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats, feature: float) -> Iterator[Finding]:
@@ -232,6 +230,6 @@ def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats, feat
     if not wrong.any():
         return
     shows = unreadable | (wrong & (real[off] >= feature * np.sqrt(square)))
-    text = f"{counted(int(wrong.sum()), 'stored normal')} unlike the face's own"
+    text = f"{tally(int(wrong.sum()), 'stored normal')} unlike the face's own"
     places = (Location(face=int(kept[i])) for i in off[wrong])
     yield T013.finding(text, int(wrong.sum()), places, None if shows.any() else "info")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from unitcad.geometry.arrays import Floats
-from unitcad.meshcheck.findings import Finding, Location, counted, ending, number
+from unitcad.meshcheck.findings import Finding, Location, ending, number, tally
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_steps
 from unitcad.meshcheck.geometry.topology import diagonals
 from unitcad.meshcheck.rules.inspection import Inspection
@@ -44,13 +44,13 @@ def not_finite(mesh: Mesh) -> tuple[Finding, ...]:
         return ()
     bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
     places = (Location(face=int(i)) for i in bad)
-    text = counted(len(finite) - int(finite.sum()), "non-finite vertex", "non-finite vertices")
+    text = tally(len(finite) - int(finite.sum()), "non-finite vertex", "non-finite vertices")
     return ending([V001.finding(text, len(bad) or 1, places)])
 
 
 def faces_not_finite(n: int, places: Iterable[Location]) -> Finding:
     """Make the finding V001 of a reader, which gives no mesh then."""
-    return V001.finding(f"{counted(n, 'face')} with a vertex that is not finite", n, places)
+    return V001.finding(f"{tally(n, 'face')} with a vertex that is not finite", n, places)
 
 
 def too_far(corners: Floats, size: Floats) -> list[Finding]:

@@ -29,14 +29,13 @@
     }
   }
 
-  // The variants of a page's data by folder; why(folder, column) says why a variant has no level by some model.
+  // The variants of a page's data by folder; why(folder) says why a variant has no level.
   function records(data) {
     const resolve = resolver(data.pool);
     const variants = new Map(data.variants);
-    const why = (folder, column) => {
-      const model = column.startsWith("edge_") && variants.has(folder) && column.slice("edge_".length);
-      const { models } = (model && resolve(variants.get(folder)).estimate) || {};
-      return models && models[model] && models[model].edge_level && models[model].edge_level.reason;
+    const why = (folder) => {
+      const { answer } = (variants.has(folder) && resolve(variants.get(folder)).estimate) || {};
+      return answer && answer.reason;
     };
     return { variants, resolve, why, variant: (folder) => (variants.has(folder) ? resolve(variants.get(folder)) : null) };
   }
@@ -47,11 +46,11 @@
     return svg && el("img", { className: "thumbnail", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: "", loading: "lazy" });
   };
 
-  // {sections, chips, plot}: `plot` draws once the sections are on a page. why(folder, column) says why a level is missing,
+  // {sections, chips, plot}: `plot` draws once the sections are on a page. why(folder) says why a level is missing,
   // variant(folder) gives a record.
   function batchOf(data, why, variant) {
     const { batch } = data;
-    const table = U.readable(data.table, data.estimate);
+    const table = U.readable(data.table);
     const nameColumn = table.columns.includes("name") ? "name" : table.columns[0];
     const varying = U.varyingIn(table);
     const named = U.namer(table, nameColumn, varying);
@@ -59,24 +58,21 @@
     const selects = {};
     let rows = [];
     const at = (name) => table.columns.indexOf(name) + 1;
-    // A model's level is plotted against what it reads: a level that stays the same is no result of the sweep.
-    const { insensitive: unread = {}, typical_error: errors = {}, not_measured: alone = {} } = data.estimate || {};
-    const blind = (x, y) => {
-      const keys = unread[U.modelOf(y)] || [];
-      const reads = [...table.swept].some((name) => varying.includes(name) && !keys.includes(name));
-      return keys.includes(x) || (keys.length > 0 && !reads);
-    };
+    // The level is plotted against what it reads: a level that stays the same is no result of the sweep.
+    const { unread = [], not_measured: alone = {} } = data.estimate || {};
+    const reads = [...table.swept].some((name) => varying.includes(name) && !unread.includes(name));
+    const blind = (x, y) => y === U.LEVEL && (unread.includes(x) || (unread.length > 0 && !reads));
     const notRead = el("p", { className: "unread", role: "status" });
     const plot = () => {
       const x = selects.x.value;
       const left = [...selects.y.options].filter((option) => (option.disabled = blind(x, option.value)));
       if (selects.y.selectedOptions[0].disabled) selects.y.value = best(x);
       const [y, group] = ["y", "group"].map((key) => selects[key].value);
-      notRead.textContent = left.length ? `Not offered: ${left.map((option) => option.value).join(", ")}, whose model does not read ${x}.` : "";
-      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], range: table.range(y, row[at(y)]), group: group ? row[at(group)] : "", title: named(row), why: (column) => why(row[0], column) || row[at("reason")], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
+      notRead.textContent = left.length ? `The level does not read ${x}: at most its range changes.` : "";
+      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], range: table.range(y, row), group: group ? row[at(group)] : "", title: named(row), why: (column) => (column === U.LEVEL && why(row[0])) || row[at("reason")], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
       clear(plotHost, U.scatterPlot(points, { xLabel: table.head(x), yLabel: table.head(y), columns: [x, y], label: `${y} against ${x}, ${points.length} variants` }),
-        points.some((point) => point.range) && el("p", { className: "note" }, `Bars: the level over and times ${number(errors[U.modelOf(y)], 3)}, the model's typical error with a measured unit left out, not an estimate's 80 % range.`),
-        U.modelOf(y) && x in alone && el("p", { className: "note unmeasured" }, `Every measured unit had ${number(alone[x])} mm for ${x}: no measurement shows how the level changes with it, so the error is not known.`));
+        points.some((point) => point.range) && el("p", { className: "note" }, "Bars: the 80 % range."),
+        y === U.LEVEL && x in alone && el("p", { className: "note unmeasured" }, `Every measured unit had ${number(alone[x])} mm for ${x}: no measurement shows how the level changes with it.`));
     };
     let ready = false;
     const pins = U.createPins(table, { nameOf: named, variant, shown: table.shown, head: table.head });
@@ -91,9 +87,8 @@
     const names = varying.length ? varying : table.columns;
     const texts = varying.filter((name) => !numeric.includes(name) && name !== nameColumn);
     const preferred = (list, pattern) => list.find((name) => pattern.test(name) && (list === texts || filled(name) * 2 > table.rows.length));
-    // The level of the best model that reads what goes across; else a volume, else anything.
-    const levels = Object.keys(errors).map((model) => `edge_${model}`);
-    const best = (x) => [...levels, ...numeric].find((name) => name !== x && numeric.includes(name) && U.modelOf(name) && filled(name) * 2 > table.rows.length && !blind(x, name))
+    // The level, if it reads what goes across; otherwise a volume, or anything.
+    const best = (x) => [U.LEVEL].find((name) => numeric.includes(name) && filled(name) * 2 > table.rows.length && !blind(x, name))
       || preferred(numeric.filter((name) => !blind(x, name)), /volume|mm3/) || numeric.find((name) => name !== x && !blind(x, name)) || names[names.length - 1];
     const across = preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0];
     const controls = el("div", { className: "tools" },

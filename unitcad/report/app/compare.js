@@ -1,7 +1,8 @@
 // Two or three pinned variants side by side: section, what was swept and came out, where their specs differ.
 (() => {
   "use strict";
-  const { el, clear, section, drawing, facts, number } = window.unitcad;
+  const U = window.unitcad;
+  const { el, clear, section, drawing, facts, number } = U;
   const MOST = 3;
 
   // Values by dotted path; text of files is left out.
@@ -66,15 +67,17 @@
       const heads = rows.map((row) => [row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, nameOf(row)) : nameOf(row), " ",
         el("button", { type: "button", className: "quiet", "aria-label": `Unpin ${nameOf(row)}`, onclick: () => unpin(row) }, "Unpin")]);
       const sections = variants.map((each) => (each && each.drawings["section.svg"] ? drawing(each.drawings["section.svg"], "The unit in section") : "–"));
-      const answers = variants.map((each) => (each && each.estimate && each.estimate.answer && each.estimate.answer.headline) || "–");
+      const found = variants.map((each) => each && each.estimate && each.estimate.answer);
+      const answers = found.map((answer) => (answer && answer.line) || "–");
+      const against = found.map((answer, i) => (i && U.compared(answer, found[0])) || "–");
       const columns = table.columns.map((name, i) => [name, rows.map((row) => row[i + 1])]).filter(([name]) => !["index", "status", "reason", "name"].includes(name));
-      const figures = columns.filter(([name, cells]) => !table.swept.has(name) && differing(cells)).map(([name, cells]) => [head(name), cells.map((cell) => shown(name, cell))]);
+      const figures = columns.filter(([name, cells]) => !table.swept.has(name) && differing(cells)).map(([name, cells]) => [head(name), cells.map((cell, i) => shown(name, cell, rows[i]))]);
       const unlike = differences(specs);
       const own = unlike.length > 0 || specs.some((spec) => spec.size);
       const chosen = own ? unlike
         : columns.filter(([name, cells]) => table.swept.has(name) && differing(cells)).map(([name, cells]) => [name, cells.map((cell) => number(cell, 6))]);
       return sideBySide(heads, [
-        ["Section and estimate", [["Section", sections], ["Estimate", answers]].filter(([, cells]) => cells.some((cell) => cell !== "–"))],
+        ["Section and estimate", [["Section", sections], ["Estimate", answers], ["Level against the first", against]].filter(([, cells]) => cells.some((cell) => cell !== "–"))],
         ["Differences of the specs", chosen], ["Differences of the results", figures]]);
     }
 

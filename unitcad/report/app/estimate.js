@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
-  const NAMES = { rule: "Fitted rule", published: "Paper, as published", corrected: "Paper's path, corrected", divider: "Fitted divider", crossings: "Only interfaces", baseline: "Baseline, four class means" };
+  const NAMES = { rule: "Fitted rule", published: "Paper, as published", corrected: "Paper's path, corrected", baseline: "Baseline, four class means" };
   const nameOf = (model) => (NAMES[model] ? `${NAMES[model]} (${model})` : model);
   const known = (value) => typeof value === "number" && Number.isFinite(value);
 
@@ -65,14 +65,14 @@
     return el("figure", { className: "ranges" }, el("figcaption", {}, caption), rows.map(line), scale, legend.length > 0 && el("ul", { className: "key" }, legend));
   }
 
-  const COLOURS = { published: "series-1", corrected: "series-3", divider: "series-2", rule: "series-5" };
+  const COLOURS = { published: "series-1", corrected: "series-3", rule: "series-5" };
 
   const ownMarks = (data) => (data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: percent(own.value) }));
 
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
-    const { p10, p50, p90, model } = data.answer || {};
-    if (known(p10)) rows.unshift({ name: `80 % range by ${model}`, entry: percents({ value: p50, low: p10, high: p90 }), colour: "series-6" });
+    const { level, low, high, source } = data.answer || {};
+    if (known(low)) rows.unshift({ name: `Level, 80 % range by ${source.model}`, entry: percents({ value: level, low, high }), colour: "series-6" });
     const found = data.measured || {};
     const measured = found.same_size ? found : {};
     const marks = [{ name: "Measured", value: percent(measured.level) }, { name: "Also printed", value: percent(measured.also_printed), dashed: true }, ...ownMarks(data)].filter(({ value }) => known(value));
@@ -183,15 +183,14 @@
     compared.sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
     const chosen = all.chosen_without;
     const ends = (range) => (range ? `${number(range.low, 3)} to ${number(range.high, 3)}` : "–");
-    const test = ({ against_best: against }) => (against && known(against.p) ? number(against.p, 2) : "–");
     const factor = (entry) => (entry ? entry.geometric_mean : "–");
     const out = (entry, key) => factor((entry.leave_one_out || {})[key]);
     return [el("h3", {}, "Error against the measured table"),
-      table(["Model", "Nine levels", "Leave-one-out", "5 to 95 %", "p to the best", "Worst", "Twelve ratios", "Leave-one-out", "Directions"], compared.map(([model, entry]) => [
-        nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_out || {}).levels || {}).range), test(entry), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
+      table(["Model", "Nine levels", "Leave-one-out", "5 to 95 %", "Worst", "Twelve ratios", "Leave-one-out", "Directions"], compared.map(([model, entry]) => [
+        nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_out || {}).levels || {}).range), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
       el("p", { className: "note" }, `Factors; 1 is exact. ${all.note || ""}`),
-      all.range && el("p", { className: "note" }, `Range: ${all.range}. p: ${all.sign_flip.note}.`),
+      all.range && el("p", { className: "note" }, `Range: ${all.range}.`),
       chosen && el("p", { className: "note" }, `Rule with its form chosen among ${chosen.forms.length} without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`), classes(all)];
   }
 
@@ -231,18 +230,31 @@
       own, layered.length > 0 && [el("h4", {}, "Layered skin"), el("ul", {}, layered.map((text) => el("li", {}, text)))]);
   }
 
-  // The answer in the words of the command line: two lines that are always there.
-  function lead({ headline, lines }) {
-    return [el("p", { className: "lead" }, headline), lines[0].length > headline.length && el("p", {}, lines[0].slice(headline.length).trim()), el("p", {}, lines[1])];
+  // A level in per cent with two digits, as `words.percent` writes it.
+  const said = (level) => {
+    if (level < 1e-4) return "below 0.01 %";
+    const shown = 100 * level;
+    return `${shown < 99.5 ? shown.toPrecision(2) : Number(shown.toPrecision(2))} %`;
+  };
+
+  // One answer against another, as `words.compared` says it; "" without both.
+  function compared(one, before) {
+    if (!one || !before) return "";
+    if (!known(one.level) || !known(before.level)) return "not compared: a level is not known";
+    const within = (level, { low, high }) => low <= level && level <= high;
+    const effect = within(one.level, before) || within(before.level, one) ? "within the range: no effect shown" : `a factor of ${number(one.level / before.level, 2)}`;
+    return `${said(one.level)} against ${said(before.level)}: ${effect}`;
+  }
+
+  // The answer in the words of the command line.
+  function lead({ lines }) {
+    return lines.map((line, i) => el("p", { className: i ? undefined : "lead" }, line));
   }
 
   function estimate(variant) {
     const data = variant.estimate;
     if (!data) {
-      const left = (variant.manifest.skipped || []).find((entry) => entry.output === "estimate");
-      const ask = !left || left.reason === "not asked for (--only)";
-      return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
-        ask ? ["No estimate here. Make it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.reason}.`));
+      return section("estimate", "Attenuation estimate", el("p", { className: "absent" }, "No estimate here. Make it with ", el("code", {}, "unitcad build SPEC --only estimate")));
     }
     return section("estimate", "Attenuation estimate", lead(data.answer), elements(data.fem),
       el("details", {}, el("summary", {}, "How sure?"), el("ul", { className: "lead-notes" }, data.answer.details.map((line) => el("li", {}, line))), levels(data), el("h3", {}, "Outwards from the edge"), curves(data.layered)),
@@ -250,5 +262,5 @@
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
-  Object.assign(window.unitcad, { estimate });
+  Object.assign(window.unitcad, { estimate, compared });
 })();

@@ -1,12 +1,10 @@
-// Rows of a batch as people read them: named by what was swept, levels in per cent with their error, three digits.
+// Rows of a batch as people read them: named by what was swept, levels in per cent with their range, three digits.
 (() => {
   "use strict";
   const { number } = window.unitcad;
-  const LEVEL = /^edge_(.+)$/;
+  const [LEVEL, LOW, HIGH, MEASURED] = ["edge_level", "edge_low", "edge_high", "edge_measured"];
   const UNIT = /_(mm3|mm|g|hz|um|c|s|kpa)$/;
   const UNITS = { mm3: "mm³", mm: "mm", g: "g", hz: "Hz", um: "µm", c: "°C", s: "s", kpa: "kPa" };
-
-  const modelOf = (column) => (LEVEL.exec(column) || [])[1];
 
   // A dotted path as a person reads it: "layers.0.wall_mm" is "layer 1 wall" in "mm".
   function spoken(path) {
@@ -15,23 +13,33 @@
     return { words: words.replace(/[._]/g, " "), unit: unit ? UNITS[unit] : "" };
   }
 
-  // Columns of levels become per cent; what was typed is shown whole, what came out to three digits.
-  function readable(table, estimate) {
-    const { typical_error: errors = {} } = estimate || {};
+  // Columns of levels become per cent, the range's ends one column with the level; what was typed is shown whole, what came
+  // out to three digits.
+  function readable(table) {
     const swept = new Set(table.swept || []);
-    const levels = new Map(table.columns.map((name, i) => [i + 1, modelOf(name)]).filter(([, model]) => model));
-    const rows = table.rows.map((row) => row.map((cell, i) => (levels.has(i) && typeof cell === "number" ? 100 * cell : cell)));
+    const at = (name) => table.columns.indexOf(name) + 1;
+    const ends = [LOW, HIGH].map(at);
+    const percents = [LEVEL, LOW, HIGH, MEASURED].map(at);
+    const whole = table.rows.map((row) => row.map((cell, i) => (i && percents.includes(i) && typeof cell === "number" ? 100 * cell : cell)));
+    const columns = table.columns.filter((name) => name !== LOW && name !== HIGH);
+    const ranges = new Map();
+    const rows = whole.map((row) => {
+      const kept = row.filter((cell, i) => !i || !ends.includes(i));
+      const range = ends.every((i) => i && typeof row[i] === "number") ? ends.map((i) => row[i]) : null;
+      ranges.set(kept, range);
+      return kept;
+    });
+    const range = (column, row) => (column === LEVEL ? ranges.get(row) || null : null);
     const digits = (column) => (swept.has(column) ? 6 : 3);
-    const error = (column) => errors[modelOf(column)];
-    const range = (column, value) => (typeof value === "number" && error(column) ? [value / error(column), value * error(column)] : null);
-    const shown = (column, value) => {
+    const shown = (column, value, row) => {
+      const found = row && range(column, row);
+      if (found) return [typeof value === "number" && number(value, 2), `(${found.map((end) => number(end, 2)).join(" to ")})`].filter(Boolean).join(" ");
       if (typeof value !== "number") return number(value);
-      const ends = range(column, value);
-      if (ends) return `${number(value, 2)} (${ends.map((end) => number(end, 2)).join(" to ")})`;
-      return number(value, Number.isInteger(value) ? 6 : digits(column));
+      return number(value, Number.isInteger(value) ? 6 : column === MEASURED ? 2 : digits(column));
     };
-    const head = (column) => (modelOf(column) ? `${column}, %` : column);
-    return { ...table, rows, digits, shown, range, head, swept };
+    const heads = { [LEVEL]: "level at the edge, % (80 % range)", [MEASURED]: "measured, %" };
+    const head = (column) => heads[column] || column;
+    return { ...table, columns, rows, digits, shown, range, head, swept };
   }
 
   // What tells a row from the others: its name, and where names repeat the values that were swept and vary.
@@ -67,5 +75,5 @@
     return `${cropped}<g stroke="#111" stroke-width="2">${paths.join("")}</g></svg>`;
   }
 
-  Object.assign(window.unitcad, { readable, namer, modelOf, bodiesOf });
+  Object.assign(window.unitcad, { readable, namer, bodiesOf, LEVEL });
 })();

@@ -87,7 +87,7 @@
       clear(body, rows.slice(first, first + PAGE).map((row) => el("tr", {}, columns().map(({ name, at }) => {
         const value = row[at];
         if (name === nameColumn) return el("th", { scope: "row" }, el("div", { className: "lead-in" }, lead(row), row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, named(row)) : named(row)));
-        return el("td", { className: typeof value === "number" ? "number" : undefined }, table.shown(name, value));
+        return el("td", { className: typeof value === "number" ? "number" : undefined }, table.shown(name, value, row));
       }))));
       count.textContent = `${rows.length} of ${table.rows.length} variants`;
       const step = (by, text) => el("button", { type: "button", disabled: state.page + by < 0 || state.page + by >= pages, onclick: () => { state.page += by; update(); } }, text);

@@ -92,12 +92,11 @@
     function current() {
       const { unit } = state;
       const { moulds, estimate } = { moulds: state.moulds.of === unit.text ? state.moulds : {}, estimate: state.estimate.of === unit.text ? state.estimate : {} };
-      const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.headline : (estimate.lines || [])[0];
+      const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.line : (estimate.lines || [])[0];
       const failed = (moulds.checks || []).filter((check) => !check.ok).length;
-      const { level } = (estimate.estimate && estimate.estimate.answer) || {};
-      const levels = typeof level === "number" ? [["edge level", 100 * level, "% of the motor's amplitude"]] : [];
+      const level = estimate.estimate && estimate.estimate.answer;
       const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
-      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...levels, ...(unit.figures || []), ...more], answer, text: unit.text || state.text, refused: page.dataset.stale === "true" };
+      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, level, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
 
     function remember(path, coalesce) {
@@ -244,7 +243,8 @@
       const { estimate, moulds } = state;
       const answer = estimate.of === state.unit.text && estimate.estimate && estimate.estimate.answer;
       const crosstalk = estimate.of === state.unit.text && estimate.drawings && `${estimate.lines[0]} `;
-      const level = crosstalk || answer && `${answer.headline} `;
+      const change = answer && state.level && state.level.of !== estimate.of && U.compared(answer, state.level.answer);
+      const level = crosstalk || answer && `${answer.line} ${change ? `Level against before: ${change}. ` : ""}`;
       const lines = moulds.of === state.unit.text && moulds.model ? moulds.lines || [] : [];
       clear(glance, level, lines.slice(0, 1).map((line) => `${line[0].toUpperCase()}${line.slice(1)}.`));
       glance.dataset.old = "false";
@@ -256,6 +256,8 @@
       await Promise.all([
         server.ask("estimate", state.text).then((answer) => {
           if (!answer || mine !== state.asked) return;
+          const { estimate: last, of } = state.estimate;
+          if (last && of !== state.unit.text) state.level = { answer: last.answer, of };
           state.estimate = { ...answer, of: state.unit.text };
           time("estimate", answer);
           showEstimate(answer);

@@ -1,9 +1,9 @@
 // One variant pinned beside the one that is changed: sections, answers, figures, and where the specs differ.
 (() => {
   "use strict";
-  const { el, clear, section, drawing, number, sideBySide, differences, flat } = window.unitcad;
+  const { el, clear, section, drawing, number, sideBySide, differences, flat, compared } = window.unitcad;
 
-  // options: current() gives {name, spec, section, figures, answer, text, refused}; restore(text) goes back to a variant;
+  // options: current() gives {name, spec, section, figures, answer, level, text, refused}; restore(text) goes back to a variant;
   // `before` is what was pinned before a reload, and keep() is told of each change.
   function createPinned({ current, restore, before, keep }) {
     let pinned = before;
@@ -42,7 +42,7 @@
       const unlike = differences(columns.map((one) => one.spec));
       host.dataset.refused = String(now.refused);
       clear(host, sideBySide(heads, [
-        ["Section and estimate", [["Section", columns.map((one) => one.section)], ["Estimate", columns.map((one) => one.answer)]]],
+        ["Section and estimate", [["Section", columns.map((one) => one.section)], ["Estimate", columns.map((one) => one.answer)], ["Level against the pinned", ["–", compared(now.level, pinned.level) || "–"]]]],
         ["Figures", names.map((name) => [name, columns.map((one) => one.figures.get(name) || "–")])],
         ["Differences of the specs", unlike.map(([path, cells]) => [path.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")]), cells])],
       ]), !now.refused && !unlike.length && el("p", { className: "note" }, "The specs are the same."));

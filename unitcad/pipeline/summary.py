@@ -1,0 +1,70 @@
+"""The lines that a person reads at the end of a build."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Container, Iterator
+from pathlib import Path
+
+from unitcad.casting.steps import casting_summary
+from unitcad.designs import widths
+from unitcad.documents import read_json
+from unitcad.meshcheck.findings import counted
+from unitcad.pipeline.manifest import BENCH, PAGE, Manifest, PartRecord, row
+from unitcad.spec import Spec, assumed_lengths, length_text
+from unitcad.text import join_words, number
+
+
+def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
+    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. Skipped outputs have no line.
+
+    A length that is `given`, by its path, counts as measured.
+    """
+    columns = row(spec, manifest)
+    parts = [part for part in manifest["parts"] if part["role"] == "unit"]
+    if parts:
+        high, alone = _height(parts), _height([part for part in parts if part["made"] != "bought"])
+        circuit = f" with its circuit, {alone} without" if alone != high and spec.fpcb else ""
+        mass = columns.get("silicone_mass_g")
+        silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
+        cells = read_json(folder / "casting.json")["cells"] if manifest["casting"] else 1
+        each = f"{cells} units, each " if cells > 1 else ""
+        cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
+        across = " x ".join(number(width, 3) for width in widths(spec, cast))
+        yield f"{each}{across} mm across, {high} mm high{circuit}{silicone}"
+    yield from assumed_line(spec, given)
+    if manifest["casting"]:
+        yield from casting_summary(read_json(folder / "casting.json"))
+    yield from checks_line(manifest)
+    if level := manifest["estimate"]:
+        yield level["line"]
+    yield from to_open(folder)
+
+
+def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
+    """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
+    if assumed := assumed_lengths(spec, given, path):
+        lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, how in assumed.items())
+        yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
+        yield f"measure first; assumed: {lengths}{yours}"
+
+
+def checks_line(manifest: Manifest) -> Iterator[str]:
+    """Yield a line of the mould checks and of the faults in files, if they were checked."""
+    checks, check = manifest["mould_checks"], manifest["check"]
+    if checks:
+        passed = sum(entry["ok"] for entry in checks)
+        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
+        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+
+
+def to_open(folder: Path) -> Iterator[str]:
+    """Yield a line for each page of a result's folder."""
+    for name, use in ((BENCH, " to cast"), (PAGE, "")):
+        if (folder / name).is_file():
+            yield f"open {shlex.quote(str(folder / name))}{use}"
+
+
+def _height(parts: list[PartRecord]) -> str:
+    boxes = [part["bbox_mm"] for part in parts]
+    return number(max((box[5] for box in boxes), default=0.0) - min((box[2] for box in boxes), default=0.0), 3)
