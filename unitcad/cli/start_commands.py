@@ -86,6 +86,9 @@ def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
         **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
         "designs": lambda: {name: design.about for name, design in designs().items()},
         **{name: lambda entries=entries: _values(entries()) for name, entries in _ENTRIES.items()},
+        "tissue": lambda: _values(
+            {f"{name}.{one.name}": one for name, of in catalogue.tissues().items() for one in of}
+        ),
         "rules": lambda: {code: f"{rule.severity}: {rule.title}" for code, rule in rules().items()},
     }
 
