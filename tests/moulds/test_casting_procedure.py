@@ -44,13 +44,23 @@ def test_bubble_rise(name, seconds):
     assert seconds > 60 * float(silicone.pot_life_min)
 
 
-def test_only_ecoflex_00_30_clears_without_a_vacuum():
-    """445 s of rise in a quarter of 45 min; the next best needs more than half of its pot life."""
-    for name in materials():
-        pour = procedure("encapsulating", f"layers.0.material={name}", "casting.vacuum=false").pours[0]
-        assert ("Such bubbles should rise out" in pour.verdict) == (name == "ecoflex-00-30")
-        assert ("brush a thin coat" in pour.verdict) == (name != "ecoflex-00-30")
-        assert "at best" in pour.verdict
+def test_bubbles_clear_without_a_vacuum_if_they_rise_in_a_quarter_of_the_pot_life():
+    """Stokes' law for 0.2 mm and 3.36 mm, worked out apart from this code; a silicone without sources promises none."""
+    clear = set()
+    for name, silicone in materials().items():
+        if any(getattr(silicone, key) is None for key in figures.CASTING_NEEDS):
+            continue
+        verdict = procedure("encapsulating", f"layers.0.material={name}", "casting.vacuum=false").pours[0].verdict
+        if silicone.mixed_viscosity_cps and silicone.pot_life_min:
+            speed = (
+                2 / 9 * 1000 * float(silicone.density_g_cm3) * 9.81 * 1e-8 / (float(silicone.mixed_viscosity_cps) / 1e3)
+            )
+            quarter = 15 * float(silicone.pot_life_min)
+            clear |= {name} if 3.36e-3 / speed <= quarter else set()
+            assert "at best" in verdict
+        assert ("Such bubbles should rise out" in verdict) == (name in clear), name
+        assert ("brush a thin coat" in verdict) == (name not in clear), name
+    assert clear == {"ecoflex-00-20", "ecoflex-00-30"}
 
 
 def test_allowance_is_a_quarter_of_the_pot_life():

@@ -137,7 +137,8 @@ def is_known_unit(unit: str) -> bool:
 
 def is_signal_unit(unit: str) -> bool:
     """Tell whether a text is a unit of a motion or of a sensor's output."""
-    return any(plain(unit) in units for units in (*ELECTRICAL, *UNITS.values()))
+    name = plain(unit)
+    return any(name in units for units in (*ELECTRICAL, *UNITS.values()))
 
 
 def ratio(unit: str, other: str) -> float | None:

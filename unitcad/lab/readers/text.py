@@ -173,10 +173,13 @@ def _longest_runs(lines: list[str], dialect: Block, skip: int) -> list[Block]:
         fresh = dialect.row(line, len(kinds))[1]
         if open_end and len(fresh) == len(kinds) + 1:  # the run began with lines whose last cell is empty
             kinds = (*kinds, "")
-        if len(fresh) != len(kinds) or any({one, other} == {"n", "t"} for one, other in zip(fresh, kinds, strict=True)):
+        mixed = len(fresh) == len(kinds) and fresh != kinds
+        if len(fresh) != len(kinds) or (mixed and any({*two} == {"n", "t"} for two in zip(fresh, kinds, strict=True))):
             start, count, kinds, open_end = i, 0, fresh, dialect.delimiter != " "
         open_end = open_end and line.endswith(dialect.delimiter)
-        kinds, count = tuple(one or other for one, other in zip(kinds, fresh, strict=True)), count + 1
+        if fresh != kinds:
+            kinds = tuple(one or other for one, other in zip(kinds, fresh, strict=True))
+        count += 1
         words = kinds.count("t")
         if kinds and words <= kinds.count("n") and (bool(words) not in best or count > best[bool(words)].lines):
             best[bool(words)] = Block(dialect.delimiter, dialect.decimal, start, count, kinds)

@@ -12,7 +12,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
-from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
+from unitcad.geometry.arrays import Bools, Floats, Ints, by_appearance, distinct, order_of_packed, unique_rows
 
 _NO_INDEX = np.empty(0, np.int64)
 
@@ -87,21 +87,38 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
         corners = representable(corners)
     sides, n = corners.shape[1], corners.shape[0] * corners.shape[1]
     room = max(n - 1, 1).bit_length()
-    key = _mix(_bits(corners)) & ~np.uint64((1 << room) - 1)
+    bits = _bits(corners)
+    key = _mix(bits) & ~np.uint64((1 << room) - 1)
     order = order_of_packed(key, room)
     fresh = distinct(key)
     places, number = by_appearance(order[fresh], n)
     index = np.empty(n, np.int32)
     index[order] = number.take(np.cumsum(fresh, dtype=np.int32) - np.int32(1))
     index = index.reshape(-1, sides)
+    apart = (bits.take(places.take(index.reshape(-1)), axis=0) != bits).any(axis=1)
+    if apart.any():
+        places, index = _told_apart(bits, places, index, apart)
     vertices = corners[places // sides, places % sides]
-    if not np.array_equal(vertices.take(index, axis=0), corners):
-        # Two places have one hash.
-        values = _bits(corners).view(corners.dtype)
-        _, first, rank = np.unique(values, axis=0, return_index=True, return_inverse=True)
-        places, number = by_appearance(first, n)
-        vertices, index = values[places], number.take(rank.reshape(-1, sides))
     return vertices.astype(np.float64), index
+
+
+def _told_apart(bits: NDArray[np.unsignedinteger], places: Ints, index: Ints, apart: Bools) -> tuple[Ints, Ints]:
+    """Return `places` and `index` of corners (n, 3) of which some places have one hash; only those are sorted again.
+
+    `apart` (n,): the corners that are not in the place of their index.
+    """
+    n = len(bits)
+    first = places.take(index.reshape(-1))  # of each corner, the first one in its place
+    among = np.zeros(len(places), bool)
+    among[index.reshape(-1)[apart]] = True
+    some = np.flatnonzero(among.take(index.reshape(-1)))
+    distinct, place = unique_rows(bits[some])
+    least = np.full(len(distinct), n)
+    np.minimum.at(least, place, some)
+    first[some] = least[place]
+    fresh = first == np.arange(n)
+    number = np.cumsum(fresh, dtype=np.int32) - np.int32(1)
+    return np.flatnonzero(fresh), number.take(first).reshape(index.shape)
 
 
 def weld_points(points: Floats) -> tuple[Floats, Ints]:
