@@ -18,9 +18,9 @@ WIDER = ("encapsulating", "moulds.bore_compensation_mm=0.1")
 
 
 def test_tools_are_larger_by_the_shrinkage_and_the_unit_is_not():
-    """In layers so fine that no rim moves to the end of one."""
-    fine = "moulds.layer_mm=0.01"
-    shrunk, plain = set_of(*SHRUNK, fine), set_of("encapsulating", fine)
+    """Caps of 1.176 mm are 1.2 mm in the tools, whole layers: no rim moves."""
+    caps = "layers.0.cap_mm=1.176", "layers.1.cap_mm=1.176"
+    shrunk, plain = set_of(*SHRUNK, *caps), set_of("encapsulating", *caps)
     assert growth(shrunk.spec) == pytest.approx(1 / 0.98)
     for name in ("layer1", "layer2"):
         assert shrunk.solids[name].volume() == plain.solids[name].volume()
