@@ -14,7 +14,7 @@ from unitcad.casting.steps import duration
 from unitcad.cli import app
 
 
-@pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
+@pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "tissue", "rules"])
 def test_list_names_what_is_shipped(kind):
     done = run("list", kind)
     assert done.returncode == 0
@@ -23,7 +23,7 @@ def test_list_names_what_is_shipped(kind):
     assert kind in run("list").stdout.split()
     for name in data[kind]:
         assert name in done.stdout
-    if kind in ("materials", "motors", "printers"):
+    if kind in ("materials", "motors", "printers", "tissue"):
         for entry in data[kind].values():
             assert all(value["status"] and value["source"] for value in entry.values())
 

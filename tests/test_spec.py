@@ -131,7 +131,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(template, setting, field,
         ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),
-        ("motor.part='foo'", r"^motor\.part = 'foo': unknown name; known: .*HD-EMC1003-2 \(10 x 2\.7 mm\)"),
+        ("motor.part='foo'", r"^motor\.part = 'foo': unknown name; known: .*LCM1027A2445F \(10 x 2\.7 mm\)"),
         ("design='d.py'", r"^design = 'd\.py': name the function or Design in that file: d\.py:NAME$"),
     ],
 )
@@ -164,7 +164,7 @@ def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are():
 
 @pytest.mark.parametrize(
     ("part", "first"),
-    [("LCM1020", "VC1018B001L"), ("LCM0820", "VC0820B006F"), ("8mm", "VC0820B006F"), ("lcm0720a3463", "LCM0720A3463F")],
+    [("LCM1020", "VC1020B327F"), ("LCM0820", "VC0820B006F"), ("8mm", "VC0820B006F"), ("lcm0720a3463", "LCM0720A3463F")],
 )
 def test_an_unknown_motor_is_answered_by_size(part, first):
     with pytest.raises(Refusal) as refused:

@@ -58,6 +58,7 @@ OTHERS = {
     "output.formats": (["stl", "glb"],),
     "materials.ours.like": ("dragon-skin-30",),
     "materials.ours.shore": ("31A",),
+    "motors.ours.leads": ("pads",),
     "motors.ours.like": ("VC0820B006F",),
     "printers.ours.like": ("fdm-0.25",),
     "printers.ours.bed_x_mm": (60.0,),

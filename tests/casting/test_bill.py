@@ -88,8 +88,8 @@ def test_a_pour_s_faults_are_data_and_its_words_agree(change, stays, late):
 @pytest.mark.parametrize(
     ("motor", "item", "note"),
     [
-        ({}, "LCM0720A3463F", "7 x 2 mm (assumed)"),
-        ({"thickness_mm": 2.3}, "LCM0720A3463F", "7 x 2.3 mm"),
+        ({}, "LCM0720A3463F", "7 x 2 mm (assumed), ERM"),
+        ({"thickness_mm": 2.3}, "LCM0720A3463F", "7 x 2.3 mm, ERM"),
         ({"thickness_mm": 3.0}, "own motor", "7 x 3 mm"),
         ({"diameter_mm": 8.0}, "own motor", "8 x 2 mm (assumed)"),
         ({"part": "VC0720B001F", "diameter_mm": 6.0}, "own motor", "6 x 2 mm"),

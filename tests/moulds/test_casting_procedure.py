@@ -11,11 +11,11 @@ from faulty_sets import set_of
 from tests.sample_bodies import LEADLESS
 from unitcad.casting import figures, procedure_text
 from unitcad.casting import procedure as casting_procedure
-from unitcad.casting.figures import unit_heights
 from unitcad.casting.steps import number_steps
 from unitcad.catalogue import materials
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cup import window_section
+from unitcad.moulds.heights import off_layers, unit_heights
 from unitcad.pipeline.write import build
 from unitcad.validation import load, templates
 
@@ -167,8 +167,9 @@ def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said():
         "layer 1's cap": (1.25, 1.2),
         "layer 2's cap": (1.25, 1.2),
         "height over all": (4.61, 4.6),
+        "tongue's thickness": (0.4, 0.4),
     }
-    assert unit_heights(set_of("embedded")) == []
+    assert off_layers(set_of("embedded")) == []
     sheet = procedure_text.to_markdown(procedure("encapsulating"))
     assert "layer 1's cap 1.2 for 1.25" in sheet
     assert "- Height over all: 4.60 mm (4.61 drawn, in layers of 0.2)." in sheet

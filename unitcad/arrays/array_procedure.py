@@ -38,7 +38,9 @@ from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, ph
 from unitcad.casting.troubles import troubles
 from unitcad.casting.views import picture_path, pour_picture
 from unitcad.catalogue import Material
+from unitcad.designs.printed import OVER_ALL
 from unitcad.meshcheck.findings import counted
+from unitcad.moulds.heights import height_warnings, unit_heights
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
@@ -87,6 +89,8 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         made,
         name=spec.name,
         label=moulds.plan.label,
+        # The flat tools are those of the inner layers only.
+        unit_heights=tuple(each for each in made.unit_heights if each.what != OVER_ALL),
         **times(prepared, pours, out, "motors and circuit in", together),
         printing=printing(moulds, printed_mm3, max(high - low for low, high in ends)),
         preparation=prepared,
@@ -384,7 +388,8 @@ def pocket_procedure(
         time_line=line,
         printing=_printing(moulds, printed_mm3, units),
         preparation=(*cast, *prepared),
-        unit_heights=(),
+        unit_heights=tuple(unit_heights(moulds)),
+        warnings=tuple(height_warnings(moulds)),
         pours=(pour,),
         release=out,
         assembly=together,

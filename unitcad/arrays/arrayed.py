@@ -44,6 +44,7 @@ from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.steps import pour_warnings
 from unitcad.checks.gap import play_missing
 from unitcad.documents import read_toml
+from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.geometry import geometric_result, record
 from unitcad.pipeline.make import make
@@ -156,6 +157,7 @@ class Arrayed(Compound):
             *covered_tails_warning(array),
             *crowded_tracks(array),
             *shallow_grooves(moulds),
+            *height_warnings(moulds),
             *play_missing(moulds),
         ]
         if "casting" in only:

@@ -12,6 +12,7 @@ from unitcad.casting.drawings import tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch, for_casting
 from unitcad.casting.plates import SPARE_TONGUE, made_pieces
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
+from unitcad.catalogue import Motor
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.tree import Body
@@ -107,7 +108,8 @@ def list_pieces(moulds: MouldSet) -> Iterator[Item]:
             note = f"from film or steel strip of {number(dims.exit.height if dims.exit else 0.0, 3)} mm"
         else:
             item, made = plan.called(name), "printed upside down" if tool.upside_down else "printed as drawn"
-            note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+            first = number(lengths.first_layer_mm, 3)
+            note = f"{lengths.printer}, layers {number(lengths.layer_mm, 3)}, first layer {first} mm"
             note += "; one is a spare" if any(piece.name == SPARE_TONGUE for piece in more) else ""
         yield Item(item, count, "piece", made, note)
 
@@ -123,9 +125,7 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
     if any(key.startswith("motor.") for key in moulds.assumed):
         note += " (assumed)"
     if motor := motor_of(spec):
-        ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
-        note += "".join(f", {number(value, 3)} {unit}" for unit, value in ratings.items() if value)
-        note += f", mass {number(motor.mass_g, 3)} g" if motor.mass_g else ""
+        note += "".join(f", {words}" for words in _ratings(motor))
     if not spec.motor.absent:
         yield Item(motor_name(spec), cells, "piece", "bought", note)
     if any(body.kind == "circuit" for body in moulds.plan.laid_later):
@@ -137,6 +137,24 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
     if wires := spec.wires:
         note = f"{number(wires.diameter_mm, 3)} mm over the insulation"
         yield Item("wire", cells * wires.count, "piece", "bought", note)
+
+
+def _ratings(motor: Motor) -> Iterator[str]:
+    """Yield what tells a motor from another one at the shop, in words."""
+    if motor.kind:
+        yield {"erm": "ERM", "lra": "LRA", "voice-coil": "voice coil", "piezo": "piezo disc"}[motor.kind.value]
+    if motor.square:
+        yield f"a square can of {number(motor.diameter_mm, 3)} mm"
+    for unit, value in (("V", motor.voltage_v), ("mA", motor.current_ma)):
+        if value:
+            yield f"{number(value, 3)} {unit}"
+    if motor.acceleration_g:
+        mass = f" on {number(motor.test_mass_g, 3)} g" if motor.test_mass_g else ""
+        yield f"{number(motor.acceleration_g, 3)} g{mass}"
+    if motor.mass_g:
+        yield f"mass {number(motor.mass_g, 3)} g"
+    if motor.leads:
+        yield motor.leads.value
 
 
 def list_consumables(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from unitcad.catalogue import Material, Value, materials, needed
-from unitcad.designs.dimensions import growth
 from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.moulds.cup import ribs
 from unitcad.moulds.mould_set import MouldSet
@@ -387,46 +386,3 @@ def eccentricity(moulds: MouldSet) -> Eccentricity:
     tight = math.sqrt(2) * UNEVEN * (depth + min(off, clearance))
     loose = math.sqrt(2) * max(off - depth, 0.0)
     return Eccentricity(len(standing), math.sqrt(2) * UNEVEN * depth, max(tight, loose))
-
-
-NEAR = 0.02
-"""Share of a layer within which a height counts as on the grid."""
-
-
-@dataclass(frozen=True)
-class UnitHeight:
-    """A height of the unit: as asked for, and as whole layers of base and cups make it, mm."""
-
-    what: str
-    asked_mm: float
-    printed_mm: float
-
-
-OVER_ALL = "height over all"
-
-
-def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
-    """Return the cavity's depth and every layer's height over its ground, if the printer's layers change them.
-
-    They are those of the cured unit: silicone shrinks from the tools' lengths.
-    """
-    if moulds.plan.way:
-        return []  # the body may stand on its side
-    dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
-    seat = -moulds.plate[0]
-    below = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)
-    heights = [("cavity", *below)] if concentric and dims.heights[0] > below[0] else []
-    for i, asked in enumerate(dims.heights, 1):
-        printed, capped = _whole(asked, layer), concentric and asked > below[0]
-        low, drawn_low = below if capped else (0.0, 0.0)
-        heights.append((f"layer {i}'s {'cap' if capped else 'height'}", asked - low, printed - drawn_low))
-        below = asked, printed
-    heights.append((OVER_ALL, *below))
-    shrunk = growth(moulds.spec)
-    off = ((what, round(asked / shrunk, 4), round(printed / shrunk, 4)) for what, asked, printed in heights)
-    return [UnitHeight(*each) for each in off if abs(each[1] - each[2]) > NEAR * layer]
-
-
-def _whole(height: float, layer: float) -> float:
-    """Return the height of the layers that a slicer makes of it, mm: it cuts each at its middle."""
-    return math.floor(height / layer + 0.5 + 1e-6) * layer

@@ -15,7 +15,6 @@ from unitcad.casting.figures import (
     LIFT_MIN,
     MIXING_MIN,
     MOST_ERROR_PCT,
-    OVER_ALL,
     PEEL_MIN,
     PULL_MIN,
     STRIKE_AGAIN_MIN,
@@ -30,7 +29,6 @@ from unitcad.casting.figures import (
     other_rooms,
     pot_life,
     pouring_min,
-    unit_heights,
     window_length,
 )
 from unitcad.casting.fittings import fittings, lead
@@ -38,7 +36,9 @@ from unitcad.casting.steps import BenchStep
 from unitcad.casting.views import picture_path, pour_picture
 from unitcad.catalogue import Material
 from unitcad.designs.design import ADHESIVE
+from unitcad.designs.printed import OVER_ALL
 from unitcad.moulds.cup import ribs
+from unitcad.moulds.heights import off_layers
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST
 from unitcad.moulds.plan import Step
@@ -551,7 +551,7 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
     spec, dims, off, exit = moulds.spec, moulds.dimensions, eccentricity(moulds), moulds.dimensions.exit
     layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
     drawn = dims.heights[-1] if moulds.plan.concentric else moulds.height
-    high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)
+    high = next((each.printed_mm for each in off_layers(moulds) if each.what == OVER_ALL), drawn)
     by_layers = f" ({shown(drawn, 2)} drawn, {layers})" if high != drawn else ""
     over = f", with the skin {shown(high + dims.skin, 2)} mm" if dims.skin else ""
     yield f"Height over all: {shown(high, 2)} mm{by_layers}{over}."

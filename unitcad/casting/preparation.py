@@ -27,6 +27,7 @@ from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.lettering import seen
 from unitcad.spec import MOTOR_SIZES, printer_of
+from unitcad.spec.raw import MouldsTable
 from unitcad.text import join_words, number, spaced
 
 PERIMETERS = 3
@@ -51,6 +52,18 @@ def slicer_settings(moulds: MouldSet) -> dict[str, str]:
         "perimeters": str(PERIMETERS),
         "support_material": "0",
     }
+
+
+def print_description(moulds: MouldSet) -> str:
+    """Return the settings of the plates in words, the first layer's height among them, which no setting carries."""
+    said = [in_layers(moulds.spec.moulds)]
+    said += [f"{key.replace('_', ' ')} {value}" for key, value in slicer_settings(moulds).items() if "layer" not in key]
+    return f"Print in this attitude: {'; '.join(said)}"
+
+
+def in_layers(lengths: MouldsTable) -> str:
+    """Write the layers of the printer."""
+    return f"layers {number(lengths.layer_mm, 3)}, first layer {number(lengths.first_layer_mm, 3)} mm"
 
 
 def _has_foot(moulds: MouldSet) -> bool:
@@ -82,6 +95,8 @@ class Printing:
     cm3: float
     of: str
     how: tuple[str, ...]
+    layer_mm: float
+    first_layer_mm: float
 
 
 def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Printing:
@@ -110,7 +125,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
         plates = f"{len(files)} plates, since one bed does not hold all: {there}"
     attitude = f" ({join_words(turned)} upside down)" if turned else ""
     how = [f"{plates}. Print the pieces as they lie{attitude}, without supports."]
-    layers = f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+    layers = f"Printer {lengths.printer}, {in_layers(lengths)}"
     if resin:
         how.append(
             f"{takes} resin. {layers}; flat on the plate. Compensate the first layers' growth (bottom "
@@ -121,6 +136,8 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
         low, high = (number(error, 2) for error in FDM_ERROR)
         how.append(f"{takes} filament (a slicer says {low} to {high} times that).")
         how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
+        first = number(lengths.first_layer_mm, 3)
+        how.append(f"Set the first layer to {first} mm in the slicer: no 3MF carries it, and heights depend on it.")
     altered = []
     if lengths.shrinkage_percent:
         altered.append(
@@ -141,6 +158,8 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
         cm3,
         "resin" if resin else "filament",
         tuple(how),
+        lengths.layer_mm,
+        lengths.first_layer_mm,
     )
 
 

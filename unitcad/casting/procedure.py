@@ -8,7 +8,7 @@ from typing import Any
 
 from unitcad import catalogue
 from unitcad.casting.bill import Item, bill
-from unitcad.casting.figures import Batch, Figure, UnitHeight, unit_heights
+from unitcad.casting.figures import Batch, Figure
 from unitcad.casting.pouring import (
     after_pours,
     film_mm3,
@@ -21,6 +21,8 @@ from unitcad.casting.pouring import (
 from unitcad.casting.preparation import Printing, preparation, printing
 from unitcad.casting.steps import BenchStep, Phase, phases
 from unitcad.casting.troubles import Trouble, troubles
+from unitcad.designs.printed import Height
+from unitcad.moulds.heights import height_warnings, unit_heights
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.rooms import load
 from unitcad.validation import warnings
@@ -70,7 +72,7 @@ class Procedure:
     time_line: tuple[Phase, ...]
     printing: Printing
     preparation: tuple[BenchStep, ...]
-    unit_heights: tuple[UnitHeight, ...]
+    unit_heights: tuple[Height, ...]
     pours: tuple[Pour, ...]
     release: tuple[BenchStep, ...]
     assembly: tuple[BenchStep, ...]
@@ -140,7 +142,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         release=out,
         assembly=motor,
         measure=tuple(measurements(moulds, grams, skin_g)),
-        warnings=tuple(warnings(spec)) if plan.makes == "unit" else (),
+        warnings=(*(warnings(spec) if plan.makes == "unit" else ()), *height_warnings(moulds)),
         troubles=troubles(moulds),
         makes=plan.makes,
         bill=bill(moulds, batches, every, after),

@@ -10,13 +10,14 @@ import msgspec
 
 from unitcad.casting.bill import Item, group_bill, in_words, plural, to_csv
 from unitcad.casting.drawings import cast_colour
-from unitcad.casting.figures import OVER_ALL
 from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep, Phase, duration, number_steps
 from unitcad.casting.troubles import TROUBLES, troubles_markdown
+from unitcad.designs.printed import OVER_ALL
 from unitcad.export import svg
 from unitcad.json_text import rounded_json
+from unitcad.moulds.heights import NEAR
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.tree import Body
@@ -163,7 +164,9 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     sections = (f"![pour {pour.index}]({pour.drawing})" for pour in procedure.pours)
     yield from (" ".join(sections), "")
     # The height over all is among the measures.
-    inside = [height for height in procedure.unit_heights if height.what != OVER_ALL]
+    near = NEAR * procedure.printing.layer_mm
+    inside = [each for each in procedure.unit_heights if abs(each.asked_mm - each.printed_mm) > near]
+    inside = [each for each in inside if each.what != OVER_ALL]
     heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)
     if inside:
         yield f"- heights in whole layers, mm: {', '.join(heights)}"

@@ -152,7 +152,8 @@ def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
     then = f"; {procedure['last'].lower()}{mixed} {duration(more)} later" if procedure["assembly"] else ""
     printing = procedure["printing"]
     time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
-    yield f"print {join_words(printing['plates'])}: about {time}, at most {volume} cm3 of {printing['of']}"
+    layers = f"layers {number(printing['layer_mm'], 3)}, first layer {number(printing['first_layer_mm'], 3)} mm"
+    yield f"print {join_words(printing['plates'])}: {layers}; about {time}, at most {volume} cm3 of {printing['of']}"
     yield "mix " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
     yield f"out of the mould {total} after the print: {count}, {bench} at the bench{then}"
     yield from (f"warning: {line}" for line in pour_warnings(pours))

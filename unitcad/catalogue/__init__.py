@@ -68,6 +68,7 @@ __all__ = [
     "needed",
     "printers",
     "tissue",
+    "tissues",
 ]
 
 _Entry = TypeVar("_Entry", Material, Motor, Printer)
@@ -202,6 +203,19 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
                 f"{path}.thickness_mm", float(layer.thickness_mm), "the last layer is a half-space; leave it out"
             )
     return tuple(layers)
+
+
+@cache
+def tissues() -> Mapping[str, tuple[Tissue, ...]]:
+    """Return the shipped tissues by name, each with its layers from the skin down.
+
+    Examples
+    --------
+    >>> from unitcad import catalogue
+    >>> list(catalogue.tissues())
+    ['forearm', 'upper-arm', 'palm', 'rigid-plate', 'gel-50kpa']
+    """
+    return {name: tissue(name) for name in _raw("tissue.toml")}
 
 
 @cache

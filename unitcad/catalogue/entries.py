@@ -36,12 +36,13 @@ LossFactor = Annotated[float, between(0, 10, "tan delta at the motor's frequency
 Young = Annotated[float, between(0.01, 1e8, "Young's modulus at small strain and the motor's frequency")]
 
 MotorDiameter = Annotated[float, between(1, LONGEST_MM, "diameter of the motor's can")]
-MotorThickness = Annotated[float, between(0.5, 100, "thickness of the motor's can")]
+MotorThickness = Annotated[float, between(0.1, 100, "thickness of the motor's can")]
 Frequency = Annotated[float, between(FREQUENCIES_HZ[0], FREQUENCIES_HZ[1], "frequency of the drive")]
 Amplitude = Annotated[float, between(0.001, 1e5, "amplitude of the motor")]
 
 Bed = Annotated[float, between(20, LONGEST_MM, "side of the printer's build volume")]
 LayerHeight = Annotated[float, between(0.005, 2, "height of a printed layer")]
+FirstLayer = Annotated[float, between(0.005, 2, "height of the first printed layer; default: as the others, layer_mm")]
 Play = Annotated[float, between(0, 2, "position error of the printer's axes, per side")]
 PlinthClearance = Annotated[float, between(0.01, 2, "gap between a cup and its plinth, per side")]
 RibInterference = Annotated[float, between(0, 2, "interference of a cup's ribs with its plinth, per side; 0: no ribs")]
@@ -152,10 +153,21 @@ class Contact(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     remedy: str | None = None
 
 
+MotorKind = Annotated[
+    Literal["erm", "lra", "voice-coil", "piezo"],
+    Meta(description="erm: a rotating mass; lra: a mass on a spring; voice-coil; piezo: a disc that bends"),
+]
+Outline = Annotated[
+    Literal["round", "square"], Meta(description="outline of the can; a square one's diameter is its side")
+]
+
+
 class Motor(Struct, frozen=True, kw_only=True):
-    """A coin motor: an ERM, or an LRA (drive "axial")."""
+    """A motor; a value that no source gives is absent."""
 
     name: str
+    kind: Value[MotorKind] | None = None
+    outline: Value[Outline] | None = None
     diameter_mm: Value[MotorDiameter]
     thickness_mm: Value[MotorThickness]
     drive: Value[Drive] | None = None
@@ -169,6 +181,15 @@ class Motor(Struct, frozen=True, kw_only=True):
     voltage_v: Value[Annotated[float, between(0.01, 1000, "rated voltage")]] | None = None
     current_ma: Value[Annotated[float, between(0.01, 1e5, "current at the rated voltage")]] | None = None
     acceleration_g: Value[Annotated[float, between(0.001, 1000, "acceleration of the maker's test mass")]] | None = None
+    test_mass_g: Value[Annotated[float, between(0.1, 1e4, "the maker's test mass")]] | None = None
+    leads: (
+        Value[Annotated[str, Meta(min_length=1, max_length=60, description="leads, such as wires or pads")]] | None
+    ) = None
+
+    @property
+    def square(self) -> bool:
+        """Whether the can is square: its round cavity is wider than `diameter_mm`."""
+        return self.outline is not None and self.outline.value == "square"
 
 
 class Printer(Struct, frozen=True, kw_only=True):
@@ -200,6 +221,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     overhang_deg: Value[Annotated[float, between(0, 90, "largest lean from the vertical that prints without support")]]
     bridge_mm: Value[Annotated[float, between(0, LONGEST_MM, "longest bridge that prints without support")]]
     nozzle_mm: Value[Annotated[float, between(0.1, 2, "bore of the nozzle, of a printer of filament")]] | None = None
+    first_layer_mm: Value[FirstLayer] | None = None
     rib_interference_mm: Value[RibInterference] | None = None
     bore_compensation_mm: Value[BoreCompensation] | None = None
     support: (

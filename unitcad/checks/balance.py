@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from manifold3d import Manifold
+
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
-from unitcad.designs.dimensions import growth
+from unitcad.designs.dimensions import growth, poured
 from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.complement import films
 from unitcad.moulds.lid import films as skin_films
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step, tool_dimensions
 from unitcad.shape import cylinder, moved
 from unitcad.shape.extent import extent
 
@@ -29,7 +32,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         yield _of_cavity(cavity, least)
     if moulds.spec.moulds.shrinkage_percent:
         for step in moulds.plan.steps:
-            cast, cured = moulds.mesh_of(step.layer[0]).volume(), moulds.solids[step.name].volume()
+            cast, cured = moulds.mesh_of(step.layer[0]).volume(), _cured(moulds, step).volume()
             off = abs((cast / cured) ** (1 / 3) / growth(moulds.spec) - 1)
             yield at_most("C100", f"pour {step.index}: as it shrinks", off, SHRUNK, "share of its length")
     for tray in moulds.plan.of_kind("tray"):
@@ -42,6 +45,17 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             hollow = column - solid
             differ = hollow.volume() + film.volume() - 2 * (hollow ^ film).volume()
             yield at_most("C100", f"{tray.name} cell {i}", differ / film.volume(), BALANCE, "share of the film")
+
+
+def _cured(moulds: MouldSet, step: Step) -> Manifold:
+    """Return the layer as it should cure: the unit's, or one as high as the whole layers of its tools make it."""
+    spec = moulds.spec
+    if moulds.origin or not moulds.plan.concentric:
+        return moulds.solids[step.name]
+    tools = tool_dimensions(spec)
+    if tools == poured(spec, moulds.dimensions):
+        return moulds.solids[step.name]
+    return moulds.mesh_of(moulds.design.layers(spec, tools.scaled(1 / growth(spec)))[step.name])
 
 
 def _of_cavity(cavity: Cavity, least: float) -> MouldFinding:

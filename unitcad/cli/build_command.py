@@ -171,7 +171,7 @@ def _print_faults(manifest: Manifest) -> None:
             warn(f"warning: {entry['output']} {entry['reason']}")
     checks = manifest["mould_checks"]
     for check in checks:
-        if check["ok"] and check["advice"]:
+        if check["ok"] and check["advice"] and check["advice"] not in manifest["warnings"]:
             warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}".rstrip() + f", limit {check['limit']:.3g}"

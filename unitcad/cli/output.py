@@ -50,9 +50,10 @@ def speak_anywhere() -> None:
 def say_error(error: UnitcadError, form: Form) -> None:
     """Print an error: a line for each fault on standard error and, but for a person, JSON on standard output."""
     if isinstance(error, WrongArgument):
-        name, value = _ARGUMENTS.get(error.field, f"--{error.field}"), error.value
+        option = error.field.replace("_", "-")
+        name, value = _ARGUMENTS.get(error.field, f"--{option}"), error.value
         if isinstance(value, bool):  # an option without a value
-            name, value = f"--{'' if value else 'no-'}{error.field}", None
+            name, value = f"--{'' if value else 'no-'}{option}", None
         error = Refusal(name, value, error.limit, error.nearest)
     if isinstance(error, Refusal):
         every = sorted((error, *error.others), key=lambda one: one.line or sys.maxsize)

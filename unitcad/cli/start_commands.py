@@ -12,6 +12,7 @@ from msgspec import to_builtins
 
 from unitcad import catalogue
 from unitcad.casting.coupon import Coupon, write
+from unitcad.catalogue.filters import SHORT, keep
 from unitcad.catalogue.moduli import moduli_note
 from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson, Out
@@ -20,6 +21,7 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import names_device, write_new
 from unitcad.meshcheck.rules.registry import rules
 from unitcad.rooms import file_kinds, load
+from unitcad.text import some
 from unitcad.validation import default_template
 from unitcad.validation.load import shipped_of
 from unitcad.validation.starter import comment_template
@@ -71,34 +73,90 @@ def init(
     typer.echo(str(path))
 
 
+_ENTRIES: dict[str, Callable[[], dict[str, Any]]] = {
+    "materials": catalogue.materials,
+    "motors": catalogue.motors,
+    "printers": catalogue.printers,
+}
+
+
 def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
     """Return the kinds in the order of the list, each with the function that returns its entries by name."""
     return {
         **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
         "designs": lambda: {name: design.about for name, design in designs().items()},
-        "materials": lambda: _values(catalogue.materials()),
-        "motors": lambda: _values(catalogue.motors()),
-        "printers": lambda: _values(catalogue.printers()),
+        **{name: lambda entries=entries: _values(entries()) for name, entries in _ENTRIES.items()},
+        "tissue": lambda: _values(
+            {f"{name}.{one.name}": one for name, of in catalogue.tissues().items() for one in of}
+        ),
         "rules": lambda: {code: f"{rule.severity}: {rule.title}" for code, rule in rules().items()},
     }
+
+
+_RANGE = "Default: all."
 
 
 def list_(
     kind: Annotated[
         str, typer.Argument(help=f"Kind to list: {', '.join(_kinds())}. Default: the kinds.", metavar="[KIND]")
     ] = "",
+    soft: Annotated[
+        str | None,
+        typer.Option(metavar="RANGE", help=f"Silicones by static modulus, such as 10..60kPa. {_RANGE}"),
+    ] = None,
+    pot_life: Annotated[
+        str | None, typer.Option(metavar="RANGE", help=f"Silicones by pot life, such as 20.. (min). {_RANGE}")
+    ] = None,
+    cure: Annotated[
+        str | None, typer.Option(metavar="RANGE", help=f"Silicones by cure, such as ..5h. {_RANGE}")
+    ] = None,
+    diameter: Annotated[
+        str | None, typer.Option(metavar="RANGE", help=f"Motors by diameter, such as 8..10 (mm). {_RANGE}")
+    ] = None,
+    thickness: Annotated[
+        str | None, typer.Option(metavar="RANGE", help=f"Motors by thickness, such as ..2.5mm. {_RANGE}")
+    ] = None,
+    frequency: Annotated[
+        str | None, typer.Option(metavar="RANGE", help=f"Motors by frequency, such as 150..250Hz. {_RANGE}")
+    ] = None,
+    bed: Annotated[
+        str | None, typer.Option(metavar="RANGE", help=f"Printers by the bed's shorter side, such as 200... {_RANGE}")
+    ] = None,
+    where: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=RANGE", help=f"Entries by any key, such as kind=lra or density_g_cm3=..1.1. {_RANGE}"
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the shipped entries, each value with its source and status."""
+    """List the shipped entries, each value with its source and status.
+
+    A filter leaves out the entries that have no value for it, and names them.
+    """
+    short = {"soft": soft, "pot_life": pot_life, "cure": cure, "diameter": diameter, "thickness": thickness}
+    wanted = {key: text for key, text in {**short, "frequency": frequency, "bed": bed}.items() if text is not None}
+    for text in where or []:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise Refusal("--where", text, "is KEY=RANGE, such as kind=lra or density_g_cm3=..1.1")
+        wanted[key.strip()] = value.strip()
     kinds = _kinds()
     if not kind:
+        if wanted:
+            raise Refusal("KIND", None, "is required with a filter", "materials")
         print_json({"kinds": list(kinds)}) if as_json else typer.echo("\n".join(kinds))
         return
     if kind not in kinds:
         raise unknown_name("KIND", kind, kinds)
-    entries = kinds[kind]()
+    entries, lacking = kinds[kind](), dict[str, list[str]]()
+    if wanted:
+        if kind not in _ENTRIES:
+            raise Refusal("KIND", kind, f"has no values to filter by; {', '.join(_ENTRIES)} have", "materials")
+        kept, lacking = keep(_ENTRIES[kind](), wanted)
+        entries = _values(kept)
     if as_json:
-        print_json({kind: entries})
+        print_json({kind: entries, **({"without_a_value": lacking} if wanted else {})})
         return
     for name, entry in entries.items():
         if isinstance(entry, str):
@@ -107,10 +165,23 @@ def list_(
         typer.echo(name)
         for key, value in entry.items():
             how = f"; {value['method']}" if "method" in value else ""
-            bounds = f" ({value['low']:g} to {value['high']:g})" if "low" in value else ""
+            bounds = _bounds(value)
             typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
         if kind == "materials" and (note := moduli_note(catalogue.materials()[name])):
             typer.echo(f"  moduli: {note}")
+    for key, names in lacking.items():
+        option = f"--{key.replace('_', '-')}" if key in SHORT else key
+        typer.echo(f"left out, without a value for {option}: {some(names)}", err=True)
+    if wanted and not entries:
+        typer.echo(f"none of the {kind} meets it", err=True)
+
+
+def _bounds(value: dict[str, Any]) -> str:
+    """Return the range of a value; one end may be missing."""
+    ends = [f"{value[end]:g}" if end in value else "" for end in ("low", "high")]
+    if all(ends):
+        return f" ({ends[0]} to {ends[1]})"
+    return f" (at least {ends[0]})" if ends[0] else f" (at most {ends[1]})" if ends[1] else ""
 
 
 def _values(entries: dict[str, Any]) -> dict[str, Any]:

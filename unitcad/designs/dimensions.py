@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from unitcad.spec import Spec
+from unitcad.spec.layers import layers_of
 
 MOTOR_CLEARANCE = 0.1
 """Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
@@ -188,8 +189,8 @@ def motor_low(spec: Spec) -> float:
 
 def whole_layers(spec: Spec, z: float) -> float:
     """Return the height (mm over the skin) nearest to `z` at which a layer of the base ends."""
-    seat, layer = spec.moulds.plate_mm + spec.moulds.plinth_height_mm, spec.moulds.layer_mm
-    return math.floor((seat + z) / layer + 0.5 + EPS) * layer - seat
+    seat = spec.moulds.plate_mm + spec.moulds.plinth_height_mm
+    return layers_of(spec).nearest(seat + z) - seat
 
 
 def slot_exit(spec: Spec, low: float, inside: tuple[float, float], width: float) -> Exit:
@@ -235,6 +236,6 @@ def growth(spec: Spec) -> float:
     return 1 / (1 - spec.moulds.shrinkage_percent / 100)
 
 
-def tool_dimensions(spec: Spec, dims: Dimensions) -> Dimensions:
-    """Return the dimensions that tools are drawn to: silicone shrinks from them to the unit's."""
+def poured(spec: Spec, dims: Dimensions) -> Dimensions:
+    """Return the dimensions of the silicone as it is poured: it shrinks from them to the unit's."""
     return dims.scaled(growth(spec)) if spec.moulds.shrinkage_percent else dims

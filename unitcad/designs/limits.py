@@ -19,6 +19,7 @@ from unitcad.catalogue import Material, Printer, needed
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Exit
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
+from unitcad.spec.layers import layers_of
 from unitcad.spec.raw import LEAST_LEDGE, FpcbTable, WiresTable
 
 
@@ -279,8 +280,7 @@ def wider_core(spec: Spec, more: float, limit: str) -> Refusal:
 
 def filament_groove(spec: Spec) -> float:
     """Return depth and width of the groove that takes the bent filament under the plate, mm: a whole layer ends it."""
-    layer = spec.moulds.layer_mm
-    return math.ceil((spec.moulds.filament_mm + 0.5) / layer - EPS) * layer
+    return layers_of(spec).up(spec.moulds.filament_mm + 0.5)
 
 
 def at_least(field: str, value: float, limit: float, why: str) -> None:

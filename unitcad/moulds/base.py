@@ -25,6 +25,7 @@ from unitcad.moulds import filament
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, Frame
 from unitcad.shape import Extrude, Profile, Shape, box, cut, moved, rounded_rectangle, turned, union
 from unitcad.spec import Spec
+from unitcad.spec.layers import layers_of
 
 GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5
 
@@ -89,9 +90,9 @@ def stand(frame: Frame, standing: Sequence[Shape], tools: Sequence[Shape] = ()) 
 
 def pry_floor(spec: Spec) -> float:
     """Return z of a pry slot's floor: PRY_DEPTH or a little more under the plate's face, on a whole layer."""
-    layer, bottom = spec.moulds.layer_mm, plate_bottom(spec)
+    layers, bottom = layers_of(spec), plate_bottom(spec)
     wanted = max(spec.moulds.plate_mm - PRY_DEPTH, 0.0)
-    return bottom + (math.floor(wanted / layer + 1e-6) * layer if wanted >= layer else wanted)
+    return bottom + (layers.down(wanted) or wanted)
 
 
 def plinth(frame: Frame) -> Shape:

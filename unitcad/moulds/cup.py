@@ -50,6 +50,7 @@ from unitcad.moulds.layout import CORNER_RADIUS, EPS, MARK, PLINTH_DRAFT_DEG, Fr
 from unitcad.shape import Extrude, Profile, Revolve, Shape, box, cut, moved, polygon, ring, union
 from unitcad.shape.profile import mm
 from unitcad.spec import Spec, printer_of
+from unitcad.spec.layers import layers_of
 
 PIN_RADIUS = 2.0
 CHAMFER = 0.4
@@ -340,19 +341,20 @@ def window_section(spec: Spec, exit: Exit, rim: float) -> tuple[float, float, fl
     tongue both as drawn and as the layers make cup, ledge and tongue. If the wall over or under the window would be
     thinner than the least wall, they keep only the clearance.
     """
-    moulds, layer = spec.moulds, spec.moulds.layer_mm
+    moulds, layers = spec.moulds, layers_of(spec)
     low, high = exit.low - moulds.window_clearance_mm, exit.high + moulds.window_clearance_mm
 
     def printed(height: float) -> tuple[float, float]:
         """Return a height in whole layers; a slicer may take one that is halfway between two for either."""
-        return math.ceil(height / layer - 0.5 - EPS) * layer, math.floor(height / layer + 0.5 + EPS) * layer
+        half = 2 * EPS * layers.height
+        return layers.printed(height - half), layers.printed(height + half)
 
     seat = -plate_bottom(spec)
     ledge = [one - other for one, other in zip(printed(exit.low + seat), printed(seat)[::-1], strict=True)]
     thickness = exit.height if printer_of(spec).technology.value == "sla" else printed(exit.height)[1]
     rise = max(rim, printed(rim)[1]) - (min(exit.low, ledge[0]) - moulds.window_clearance_mm)
     drop = min(rim, printed(rim)[0]) - (max(exit.high, ledge[1] + thickness) + moulds.window_clearance_mm)
-    bottom, top = rim - math.ceil(rise / layer - EPS) * layer, rim - math.floor(drop / layer + EPS) * layer
+    bottom, top = rim - layers.up(rise), rim - layers.down(drop)
     return (
         exit.width / 2 + moulds.window_clearance_mm,
         bottom if bottom >= moulds.least_wall_mm - EPS else low,

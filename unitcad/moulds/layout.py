@@ -11,6 +11,7 @@ from unitcad.designs.design import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.shape.lettering import HEIGHT, text_width
 from unitcad.spec import Spec
+from unitcad.spec.layers import layers_of
 
 PLINTH_DRAFT_DEG = 5.0
 CORNER_RADIUS = 2.0
@@ -138,8 +139,8 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
 
 def groove_depth_of(spec: Spec, rim: float) -> float:
     """Return the depth of an overflow groove: the printer's, or half a low rim's height, down to a whole layer."""
-    depth, layer = min(spec.moulds.groove_depth_mm, rim / 2), spec.moulds.layer_mm
-    return math.floor(depth / layer + EPS) * layer if depth >= layer else depth
+    depth = min(spec.moulds.groove_depth_mm, rim / 2)
+    return layers_of(spec).down(depth) or depth
 
 
 def _too_tall(spec: Spec, tallest: float) -> Refusal:

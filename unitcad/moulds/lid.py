@@ -36,6 +36,7 @@ from unitcad.moulds.cup import grooves, window_section
 from unitcad.moulds.layout import MARK, Frame
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, mm, moved, polygon, union
 from unitcad.spec import Spec
+from unitcad.spec.layers import layers_of
 
 TILT_DEG = 5.0
 """The tilt that a mould must bear on the bench."""
@@ -114,11 +115,11 @@ def lid(frame: Frame, layer: int, drilled: Sequence[Shape], cores: Sequence[Shap
 def skirt_end(frame: Frame, layer: int) -> float:
     """Return z of the lower edge of a lid's skirt: above the windows, a whole layer from its printed underside."""
     dims = frame.dims
-    rim, top, height = dims.heights[layer], lid_top(dims, layer), frame.spec.moulds.layer_mm
+    rim, top, layers = dims.heights[layer], lid_top(dims, layer), layers_of(frame.spec)
     low = rim - SKIRT
     if dims.exit:
         low = max(low, window_section(frame.spec, dims.exit, rim)[2] + SKIRT_OFF_WINDOW)
-    return top - math.floor((top - low) / height + 1e-6) * height
+    return top - layers.down(top - low)
 
 
 def lid_top(dims: Dimensions, layer: int) -> float:
@@ -272,8 +273,8 @@ FLOOR_MM = 2.0
 def skin_tray(frame: Frame) -> Shape:
     """Draw the tray, its rim at the top of the last layer."""
     dims = frame.dims
-    rim, layer = dims.heights[-1], frame.spec.moulds.layer_mm
-    floor = math.ceil((FLOOR_MM + dims.skin) / layer - 1e-6) * layer - dims.skin
+    rim, layers = dims.heights[-1], layers_of(frame.spec)
+    floor = layers.up(FLOOR_MM + dims.skin) - dims.skin
     film = cylinder(dims.outer_radius, rim - dims.skin, rim + BEYOND)
     recesses = [moved(film, cell.x, cell.y) for cell in frame.lay.cells]
     closed = replace(frame, dims=replace(dims, exit=None))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.design import BEYOND, Cell, Fitting, Layout, Tooling
-from unitcad.designs.dimensions import tool_dimensions
+from unitcad.designs.dimensions import poured
+from unitcad.designs.printed import in_layers
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import filament, lid
 from unitcad.moulds.base import base, plate_bottom, plate_top, tongues
@@ -275,9 +276,11 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
 
     Raises Refusal if the design draws others than the spec has layers for.
     """
-    if spec.moulds.shrinkage_percent:
-        design = design_of(spec)
-        drawn = design.layers(spec, tool_dimensions(spec, design.dimensions(spec)))
+    design = design_of(spec)
+    dims = design.dimensions(spec)
+    cast = tool_dimensions(spec)
+    if cast != dims:
+        drawn = design.layers(spec, cast)
         return tuple(drawn[f"layer{i + 1}"] for i in range(len(spec.layers)))
     bodies = sorted((body for body in unit_bodies(spec) if body.kind == "layer"), key=lambda body: body.step or 0)
     if len(bodies) != len(spec.layers):
@@ -285,6 +288,13 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
         limit = f"moulds need each of the spec's {len(spec.layers)} [[layers]] drawn as layer1 ...; it draws {drawn}"
         raise Refusal("design", spec.design, f"{limit}{UNIT_ALONE}")
     return tuple(body.shape for body in bodies)
+
+
+def tool_dimensions(spec: Spec) -> Dimensions:
+    """Return the dimensions that tools are drawn to: of the silicone as poured; of rings and cups, in whole layers."""
+    design = design_of(spec)
+    dims = poured(spec, design.dimensions(spec))
+    return in_layers(spec, dims) if design.tooling == "concentric" else dims
 
 
 def place_in_cell(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
@@ -319,7 +329,7 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     Raises Refusal beyond the bed, for a tail that reaches no edge, and for a tongue or vents that can't clear the air.
     """
     design = design_of(spec)
-    frame = Frame.of(spec, tool_dimensions(spec, design.dimensions(spec)))
+    frame = Frame.of(spec, tool_dimensions(spec))
     dims, lay, pours = frame.dims, frame.lay, range(len(cast))
     lid.check_tongue(frame)
     injected = spec.moulds.pour == "injected"

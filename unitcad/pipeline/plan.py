@@ -20,7 +20,7 @@ import numpy as np
 from unitcad import __version__
 from unitcad.cache import digest
 from unitcad.casting.plates import SPARE_TONGUE, plates
-from unitcad.casting.preparation import slicer_settings
+from unitcad.casting.preparation import print_description, slicer_settings
 from unitcad.casting.procedure_text import step_section
 from unitcad.casting.views import BenchPictures, picture_path
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError, WrongArgument, unknown_name
@@ -91,9 +91,10 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             path, key = f"{group.name}/{file_stem(body)}.stl", partial(body_key, moulds, body, "stl")
             yield Planned(path, partial(stl_content, moulds, body), key, form="stl", bodies=(body.name,))
         for path, plate in plates(moulds, printed, together).items():
-            settings = slicer_settings(moulds) if group.name == "moulds" else {}
-            make = partial(threemf_content, moulds, plate, settings)
-            key = partial(joint_key, moulds, plate, "3mf", *bed, settings)
+            ours = group.name == "moulds"
+            settings, said = (slicer_settings(moulds), print_description(moulds)) if ours else ({}, "")
+            make = partial(threemf_content, moulds, plate, settings, said)
+            key = partial(joint_key, moulds, plate, "3mf", *bed, settings, said)
             spared = next((body.name for body in plate if body.kind == "tongue"), "")
             names = tuple(spared if body.name == SPARE_TONGUE else body.name for body in plate)
             yield Planned(path, make, key, form="3mf", bodies=names)
@@ -245,16 +246,20 @@ def stl_content(moulds: MouldSet, body: Body) -> bytes:
     return printing.stl(*ready(moulds, body), body.name)
 
 
-def threemf_content(moulds: MouldSet, bodies: Sequence[Body], settings: Mapping[str, str]) -> bytes:
-    """Return the 3MF of several bodies, side by side on the bed, with settings for the slicer; copies share a mesh."""
+def threemf_content(
+    moulds: MouldSet, bodies: Sequence[Body], settings: Mapping[str, str], description: str = ""
+) -> bytes:
+    """Return the 3MF of several bodies, side by side on the bed, with settings for the slicer; copies share a mesh.
+
+    `description`: what a person reads of them in any program.
+    """
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     alike = copies(bodies)
     parts = []
     for name, places in zip(part_names(bodies, alike), alike, strict=True):
         first, several = bodies[places[0]], tuple(bodies[i].name for i in places) if len(places) > 1 else ()
         parts.append(printing.MeshPart(name, first.colour, *ready(moulds, first), copies=several))
-    said = "; ".join(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())
-    return printing.content(parts, bed, settings, f"Print in this attitude: {said}" if said else "")
+    return printing.content(parts, bed, settings, description)
 
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from unitcad.casting.steps import casting_summary
 from unitcad.designs import widths
+from unitcad.designs.printed import OVER_ALL
 from unitcad.documents import read_json
 from unitcad.meshcheck.findings import counted
+from unitcad.moulds.heights import NEAR
 from unitcad.pipeline.manifest import BENCH, PAGE, Manifest, PartRecord, row
 from unitcad.spec import Spec, assumed_lengths, length_text
 from unitcad.text import join_words, number
@@ -31,7 +34,10 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         each = f"{cells} units, each " if cells > 1 else ""
         cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
         across = " x ".join(number(width, 3) for width in widths(spec, cast))
-        yield f"{each}{across} mm across, {high} mm high{circuit}{silicone}"
+        made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
+        if made and circuit:
+            made += f", {high} with its circuit"
+        yield f"{each}{across} mm across, {made or f'{high} mm high{circuit}'}{silicone}"
     yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(read_json(folder / "casting.json"))
@@ -39,6 +45,20 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
     if level := manifest["estimate"]:
         yield level["line"]
     yield from to_open(folder)
+
+
+def as_printed(casting: Mapping[str, Any]) -> str:
+    """Write the height over all and the caps as the printer makes them; "" if it makes them as drawn."""
+    heights = casting["unit_heights"]
+    total = next((each for each in heights if each["what"] == OVER_ALL), None)
+    caps = [each for each in heights if each["what"].endswith("'s cap")]
+    near = NEAR * casting["printing"]["layer_mm"]
+    if total is None or all(abs(each["printed_mm"] - each["asked_mm"]) <= near for each in (total, *caps)):
+        return ""
+    drawn, printed = (number(total[key], 3) for key in ("asked_mm", "printed_mm"))
+    thick = join_words(number(each["printed_mm"], 3) for each in caps)
+    named = f", cap{'s' * (len(caps) > 1)} {thick}" if caps else ""
+    return f"{printed} mm high (drawn {drawn}){named}"
 
 
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:

@@ -13,6 +13,7 @@ from unitcad.casting.figures import check_castable
 from unitcad.casting.procedure import procedure
 from unitcad.designs import design_of
 from unitcad.designs.design import Reason
+from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.geometry import filed, geometric_result
 from unitcad.pipeline.manifest import DRAWING, NO_KERNEL, UNCHECKED, Manifest, Skipped
@@ -83,7 +84,9 @@ class Unit(Subject):
         if "casting" in only:
             progress("casting")
             made.cast(procedure(moulds, made.volumes_mm3, made.printed_mm3))
-        made.warnings = [*warnings(spec), *(shallow_grooves(moulds) if "moulds" in only else [])]
+        made.warnings = list(warnings(spec))
+        if "moulds" in only:
+            made.warnings += [*shallow_grooves(moulds), *height_warnings(moulds)]
         lacking = [Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)]
         made.skipped = [*lacking, *made.skipped]
         made.compensation = {

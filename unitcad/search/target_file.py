@@ -26,6 +26,7 @@ from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEnt
 from unitcad.catalogue import entries as kinds
 from unitcad.catalogue.entries import between
 from unitcad.designs import shipped as designs
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert
@@ -94,6 +95,7 @@ class AtHandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     )
     printer: Annotated[Name, Meta(description="printer of the catalogue")] = "fdm-0.4"
     scale_g: Annotated[float, between(1e-6, 1000, "smallest step of the scale")] = 0.01
+    cupboard: Annotated[str | None, Meta(description="file of what you own: a table at_hand, and own entries")] = None
     room_c: Annotated[float, between(5, 45, "temperature of the room")] = 23.0
     vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
 
@@ -150,6 +152,15 @@ class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     tissue: dict[str, dict[str, TissueEntry]] = {}
 
 
+class Cupboard(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a person owns: the table `at_hand` of his targets, and own entries."""
+
+    at_hand: AtHandTable
+    materials: dict[str, MaterialEntry] = {}
+    motors: dict[str, MotorEntry] = {}
+    printers: dict[str, PrinterEntry] = {}
+
+
 @dataclass(frozen=True)
 class Target:
     """A validated target.
@@ -182,19 +193,46 @@ def load_target(source: str | os.PathLike[str]) -> Target:
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:
     """Return the target of a file's data; its relative paths start at `folder`. Raises as `load_target`."""
     _check_percent(data)
+    data = _with_cupboard(data, folder)
     asked = convert(data, TargetFile)
     _check_target(asked.target)
     _check_ranges(asked.vary)
     _check_spec(asked.spec)
-    known = catalogue.materials(asked.materials)
-    at_hand = asked.at_hand
-    names = _named("at_hand.materials", at_hand.materials, known)
-    chosen = _named("at_hand.designs", at_hand.designs, {n: d for n, d in designs().items() if d.passes is not None})
-    _named("at_hand.motors", at_hand.motors, catalogue.motors(asked.motors))
-    _named("at_hand.printer", [at_hand.printer], catalogue.printers(asked.printers))
+    names, chosen = _check_names(asked.at_hand, asked)
     catalogue.tissue(asked.estimate.tissue, asked.tissue)
     text, fit = _fit(asked.estimate, folder)
     return Target(name, asked, names, chosen, _entries(asked, data, text), fit)
+
+
+def _with_cupboard(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Return a target's data with what its cupboard holds; keys and entries of the target go before the cupboard's.
+
+    Raises Refusal for a cupboard that can't be read, and for one with a fault.
+    """
+    at_hand = data.get("at_hand")
+    name = at_hand.get("cupboard") if isinstance(at_hand, Mapping) else None
+    if not isinstance(at_hand, Mapping) or not isinstance(name, str):
+        return data
+    try:
+        owned = read_toml(folder / name)
+        cupboard = convert(owned, Cupboard)
+        _check_names(cupboard.at_hand, cupboard)
+        if cupboard.at_hand.cupboard is not None:
+            raise Refusal("at_hand.cupboard", cupboard.at_hand.cupboard, "a cupboard names no other one")
+    except (UnitcadError, OSError) as error:
+        raise Refusal("at_hand.cupboard", name, str(error)) from None
+    given = {key: data[key] for key in ("materials", "motors", "printers") if isinstance(data.get(key), Mapping)}
+    entries = {key: {**owned[key], **given.get(key, {})} for key in owned if key != "at_hand"}
+    return {**data, **entries, "at_hand": {**owned["at_hand"], **at_hand}}
+
+
+def _check_names(at_hand: AtHandTable, own: TargetFile | Cupboard) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the silicones at hand and the designs to try. Raises Refusal for an unknown name, and for one twice."""
+    names = _named("at_hand.materials", at_hand.materials, catalogue.materials(own.materials))
+    chosen = _named("at_hand.designs", at_hand.designs, {n: d for n, d in designs().items() if d.passes is not None})
+    _named("at_hand.motors", at_hand.motors, catalogue.motors(own.motors))
+    _named("at_hand.printer", [at_hand.printer], catalogue.printers(own.printers))
+    return names, chosen
 
 
 def _named(field: str, given: Sequence[str] | None, known: Mapping[str, Any]) -> tuple[str, ...]:

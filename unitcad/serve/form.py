@@ -12,7 +12,7 @@ import tomlkit
 from msgspec.structs import replace
 from tomlkit.items import AoT, InlineTable
 
-from unitcad.catalogue import Material, materials, motors, printers, tissue
+from unitcad.catalogue import Material, materials, motors, printers, tissues
 from unitcad.designs import shipped
 from unitcad.documents import editable_toml, parse_value
 from unitcad.errors import Refusal, UnitcadError
@@ -209,7 +209,7 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
                        *names("motors")],
         "moulds.printer": [*((name, str(entry.technology.value)) for name, entry in printers().items()),
                            *names("printers")],
-        "estimate.tissue": [*((name, "") for name in ("forearm",) if tissue(name)), *names("tissue")],
+        "estimate.tissue": [*((name, "") for name in tissues()), *names("tissue")],
     }  # fmt: skip
 
 

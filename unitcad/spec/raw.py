@@ -162,6 +162,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     bed_y_mm: kinds.Bed = DERIVED
     bed_z_mm: kinds.Bed = DERIVED
     layer_mm: kinds.LayerHeight = DERIVED
+    first_layer_mm: kinds.FirstLayer = DERIVED
     xy_play_mm: kinds.Play = DERIVED
     plinth_clearance_mm: kinds.PlinthClearance = DERIVED
     rib_interference_mm: kinds.RibInterference = DERIVED

@@ -201,7 +201,8 @@ def _override(printer: catalogue.Printer, moulds: MouldsTable) -> catalogue.Prin
 def motor_of(spec: Spec) -> catalogue.Motor | None:
     """Return the catalogue's motor, or None if the spec names none or overrides a size beyond the entry's range."""
     motor = _named_motor(spec)
-    if motor and all(_within(getattr(spec.motor, size), getattr(motor, size)) for size in MOTOR_SIZES):
+    sizes = [size for size in MOTOR_SIZES if not (motor and motor.square and size == "diameter_mm")]
+    if motor and all(_within(getattr(spec.motor, size), getattr(motor, size)) for size in sizes):
         return motor
     return None
 

@@ -19,6 +19,7 @@ from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
+from unitcad.spec.layers import Layers
 from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, FpcbTable, MouldsTable, RawSpec
 from unitcad.spec.resolved import CastLayer, MotorSize
 from unitcad.text import number, with_article
@@ -138,6 +139,10 @@ def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     name = DEFAULT_MOTOR if given.part is None and set(sizes.values()) == {None} else given.part
     if name is not None:
         part = catalogue.choose("motor.part", name, catalogue.motors(raw.motors))
+        if part.square and (sizes["diameter_mm"] or 0.0) < (corners := math.sqrt(2) * float(part.diameter_mm)):
+            outline = f"the outline of {name} is a square of {number(part.diameter_mm, 3)} mm"
+            limit = f"must be at least {corners:.1f}: {outline}, and a cavity is round"
+            raise Refusal("motor.diameter_mm", sizes["diameter_mm"], limit, math.ceil(10 * corners) / 10)
         sizes = {field: float(getattr(part, field)) if size is None else size for field, size in sizes.items()}
     for field, size in sizes.items():
         if size is None:
@@ -167,21 +172,26 @@ def _moulds(raw: RawSpec, design: Design) -> MouldsTable:
     printer = catalogue.choose("moulds.printer", raw.moulds.printer, catalogue.printers(raw.printers))
     given = structs.asdict(raw.moulds)
     lengths = {name: float(getattr(printer, name) or 0.0) for name in _PRINTER_LENGTHS if given[name] is None}
+    least = least_slot(raw.fpcb, raw.wires, design.wire_sides)
     if "slot_height_mm" in lengths:
-        least = least_slot(raw.fpcb, raw.wires, design.wire_sides)
         lengths["slot_height_mm"] = max(lengths["slot_height_mm"], least)
     layer = raw.moulds.layer_mm or lengths["layer_mm"]
+    layers = Layers(raw.moulds.first_layer_mm or lengths["first_layer_mm"] or layer, layer)
     lengths |= {name: least for name, least in _BASE.items() if given[name] is None}
     if "plinth_height_mm" in lengths:
         lengths["plinth_height_mm"] = max(lengths["plinth_height_mm"], _for_leaves(printer, {**given, **lengths}))
     if given["shrinkage_percent"] is None:
         known = catalogue.materials(raw.materials)
         lengths["shrinkage_percent"] = max(float(known[one.material].shrinkage_percent or 0.0) for one in raw.layers)
-    heights = {
-        name: round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
-        for name in ("slot_height_mm", *_BASE)
-        if name in lengths
-    }
+    heights = {"first_layer_mm": layers.first}
+    if "plate_mm" in lengths:
+        heights["plate_mm"] = layers.up(lengths["plate_mm"])
+    if "plinth_height_mm" in lengths:
+        heights["plinth_height_mm"] = round(layers.steps(lengths["plinth_height_mm"]), 9)
+    if "slot_height_mm" in lengths:  # a tongue is printed flat, and as high as its slot
+        nearest = layers.nearest(lengths["slot_height_mm"])
+        thinnest = max(least, float(printer.least_feature_mm))
+        heights["slot_height_mm"] = nearest if nearest >= thinnest - 1e-9 else layers.up(thinnest)
     convert(heights, MouldsTable, "moulds")  # they may exceed their limits; the other lengths were checked before
     return structs.replace(raw.moulds, **{**lengths, **heights})
 
@@ -215,6 +225,11 @@ def _estimate(raw: RawSpec, part: catalogue.Motor | None) -> EstimateTable:
     unknown = dict(UNKNOWN_MOTOR)
     if part and part.rpm:
         unknown["frequency_hz"] = round(float(part.rpm) / 60, 3)
+    if part and part.kind and part.kind.value in ("piezo", "voice-coil"):
+        for field in unknown:
+            if not (getattr(raw.estimate, field) or getattr(part, field)):
+                limit = f"is required: no source gives it for {part.name} ({part.kind.value}), and it is no coin motor"
+                raise Refusal(f"estimate.{field}", None, limit)
     values = {
         field: getattr(raw.estimate, field) or float(getattr(part, field, None) or default)
         for field, default in unknown.items()
@@ -236,11 +251,31 @@ GRAVITY, MOTOR_G_CM3 = 9.80665, 5.0
 def warnings(spec: Spec) -> list[str]:
     """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
     design, found = design_of(spec), [*_thin_layers(spec), *_bonds(spec), *_leads(spec), *_roof(spec)]
+    found += _of_another_motor(spec)
     low, high = CIRCUIT_STOCK
     if spec.fpcb and not low <= spec.fpcb.thickness_mm <= high:
         stock = f"flexible circuits are {low:g} to {high:g} mm thick"
         found.append(f"fpcb.thickness_mm = {spec.fpcb.thickness_mm:g} mm: {stock}")
     return [*found, *_play(spec), *design.advice(spec, design.dimensions(spec))]
+
+
+def _of_another_motor(spec: Spec) -> list[str]:
+    """Warn of a frequency or an amplitude that is the article's motor's, since no source gives the part's own."""
+    part = motor_of(spec)
+    if part is None:
+        return []
+    values = {"frequency_hz": ("frequency", "Hz"), "amplitude_um": ("amplitude", "um")}
+    lacking = [
+        (word, f"{default:g} {unit}")
+        for key, (word, unit) in values.items()
+        if getattr(spec.estimate, key) == (default := UNKNOWN_MOTOR[key])
+        and getattr(part, key) is None
+        and not (key == "frequency_hz" and part.rpm)
+    ]
+    if not lacking:
+        return []
+    words, assumed = (" and ".join(each) for each in zip(*lacking, strict=True))
+    return [f"no source gives the {words} of {part.name}: the {assumed} of {DEFAULT_MOTOR} stand in"]
 
 
 def _thin_layers(spec: Spec) -> list[str]:

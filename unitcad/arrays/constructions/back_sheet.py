@@ -66,6 +66,7 @@ from unitcad.shape import (
 from unitcad.shape.lettering import HEIGHT
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec
+from unitcad.spec.layers import layers_of
 from unitcad.text import number
 
 OFF_SQUARE = 4.0
@@ -96,7 +97,7 @@ def drawing_of(array: Array) -> Drawing:
     spec, moulds = array.unit, array.unit.moulds
     dims = replace(dimensions(spec), exit=None, sides=())
     height = min(dims.heights[0] - moulds.least_wall_mm - 0.4, 3.0)
-    height = math.floor(height / moulds.layer_mm + 1e-6) * moulds.layer_mm
+    height = math.floor(height / moulds.layer_mm + 1e-6) * moulds.layer_mm  # over the seat, the end of a layer
     label = HEIGHT * moulds.engraving_stroke_mm
     hole = PIN_RADIUS + moulds.plinth_clearance_mm
     wall = max(2 * hole + 2 * moulds.least_wall_mm, label + 1.0 + moulds.least_wall_mm)
@@ -511,7 +512,7 @@ def _depth(drawn: Drawing, side: Side, middle: float) -> float:
             most -= filament_groove(drawn.spec)
     depth = min(PRY_DEPTH, most - wall)
     # The floor on a whole layer from the plate's lower face.
-    floor = math.ceil((moulds.plate_mm - depth) / moulds.layer_mm - 1e-6) * moulds.layer_mm
+    floor = layers_of(drawn.spec).up(moulds.plate_mm - depth)
     return moulds.plate_mm - floor if moulds.plate_mm - floor >= LEAST_DEPTH - 1e-6 else 0.0
 
 

@@ -35,6 +35,7 @@ from unitcad.shape import (
 )
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.spec import Spec, printer_of
+from unitcad.spec.layers import layers_of
 
 MOST_DEG = 75.0
 """Of the sheet's ends from the top, at most (assumed): beyond it lid and base slide on each other as they close."""
@@ -199,7 +200,7 @@ def _former(array: Array) -> Former:
     moats = (radius * math.cos(turn) - dims.outer_radius * math.sin(turn) - radius for turn in turns)
     lowest = min(seat - moulds.plate_mm, *moats)
     under = max(moulds.plate_mm, GRIP_RADIUS + moulds.least_wall_mm)
-    bottom = mm(seat - math.ceil((seat - lowest + under) / moulds.layer_mm) * moulds.layer_mm)
+    bottom = mm(seat - layers_of(spec).up(seat - lowest + under))
     x, y = edge + beside / 2, half[1] - hole - 2 * moulds.least_wall_mm
     places = (-x, -y), (x, -y), (-x, y), (x, y - OFF_SQUARE)
     size, height = f"the base of {2 * half[0]:.4g} x {2 * half[1]:.4g} mm", mm(sheet.high + THICKNESS - bottom)
