@@ -5,11 +5,13 @@ import math
 import pytest
 from faulty_sets import set_of, with_fault
 
+from unitcad.attenuation.edge.words import lines
 from unitcad.checks import check_moulds, strains
 from unitcad.checks.balance import findings as balance
 from unitcad.designs.dimensions import LIP_LEAN_DEG
 from unitcad.errors import Refusal
-from unitcad.validation import load, warnings
+from unitcad.estimate_inputs import answer_spec
+from unitcad.validation import load
 
 
 def frustum(low, high, height):
@@ -88,4 +90,5 @@ def test_refused_with_a_value_that_is_accepted(changes, field, nearest):
 
 
 def test_a_lip_is_told_apart_from_the_measured_units():
-    assert any("no measured unit has a lip" in line for line in warnings(load("encapsulating", ["motor.lip_mm=0.5"])))
+    (level, *_) = lines(answer_spec(load("encapsulating", ["motor.lip_mm=0.5"])))
+    assert level.endswith("Wider range: no measured unit had its lip.")

@@ -92,12 +92,10 @@ def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(argument
     assert planted.ran.exists()
 
 
-def test_an_estimate_reads_a_named_design_and_with_it_runs_its_file(planted):
-    """Its file says whether it has an estimate; a function has none."""
+def test_an_estimate_of_a_named_design_has_a_curve_and_no_level(planted):
     done = planted.run("estimate named.toml")
-    assert planted.ran.exists()
-    assert done.returncode == 2, done.stderr
-    assert "has no estimate" in done.stderr
+    assert done.returncode == 0, done.stderr
+    assert "Level at the edge: " not in done.stdout
 
 
 def test_a_page_is_made_of_a_result_whose_code_does_not_run(planted):

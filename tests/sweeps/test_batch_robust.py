@@ -17,7 +17,7 @@ from process_trees import left, until
 from unitcad.cache import DiskStore, MemoryStore, MissingContent, disk
 from unitcad.errors import Unfinished, UnitcadError
 from unitcad.meshcheck import Limits, Options
-from unitcad.pipeline import make
+from unitcad.pipeline import geometry
 from unitcad.pipeline.write import build, whole
 from unitcad.validation import load
 
@@ -193,7 +193,7 @@ SPEC = ("single-embedded", ["output.formats=['stl']"])
 
 def test_an_unfinished_check_is_not_stored_and_the_next_build_is_right(monkeypatch, tmp_path):
     store, out = DiskStore(tmp_path / "cache"), tmp_path / "out"
-    monkeypatch.setattr(make, "Options", partial(Options, limits=Limits(seconds=1e-9)))
+    monkeypatch.setattr(geometry, "Options", partial(Options, limits=Limits(seconds=1e-9)))
     for _ in range(2):
         with pytest.raises(Unfinished, match=r"layer1\.stl: its check was not finished"):
             build(load(*SPEC), out, only=("unit",), store=store)

@@ -150,6 +150,7 @@ REFUSED = {
     *(f"{JOURNAL}: {how}" for how in ("linked", "a folder", "a pipe")),
     *(f"batch.lock: {how}" for how in ("linked", "dangling", "a folder")),
     *(f"{file}: a folder" for file in ("batch.json", "variants.csv", "timings.json")),
+    *(f"{file}: a pipe" for file in ("batch.json", "variants.csv", "timings.json")),
     f"{JOURNAL}: nonsense",
 }
 FAILED = {"the variant: a file", "the variant: linked"}

@@ -81,8 +81,8 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     if len(which):
         worst = which[np.argmax(nesting.area[which])]
         text = f"volume {number(volumes[worst], 3)} mm3 over {number(nesting.area[worst], 3)} mm2 of surface"
-        wide = nesting.area[which] / 2 / diagonals(low[which], high[which])  # of each of its two sides
-        lost = nesting.flat.all() or (wide >= topology.resolution.feature).any()
+        across = diagonals(low[which], high[which])
+        lost = nesting.flat.all() or (nesting.area[which] / 2 >= topology.resolution.feature * across).any()
         severity = None if lost or part.strict else "warning"
         yield G007.finding(text, len(which), (_where(topology, i) for i in which.tolist()), severity)
     sound = nesting.sound
