@@ -125,7 +125,9 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[1].startswith(
         "measure first; assumed: motor.thickness_mm = 2 (2 to 2.65: up to 0.65 mm out of the skin"
     )
-    assert lines[2].startswith(f"print moulds/moulds.3mf: about {duration(procedure['printing']['minutes'])}, at most ")
+    assert lines[2].startswith(
+        f"print moulds/moulds.3mf: layers 0.2, first layer 0.2 mm; about {duration(procedure['printing']['minutes'])}, at most "
+    )
     assert lines[3] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
     out = duration(procedure["earliest_finish_min"])
     assert lines[4].startswith(f"out of the mould {out} after the print: 2 pours, ")

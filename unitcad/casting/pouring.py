@@ -571,6 +571,9 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], skin_g: float) -> 
         yield f"The {opening}: {size}, open all the way."
     weights = " + ".join(shown(each) for each in masses_g) + (f" = {shown(sum(masses_g))}" if len(masses_g) > 1 else "")
     low = "" if moulds.plan.steps[-1].injected else " or a low strike"
+    low += (
+        f", or only the layers' lower height ({shown(high, 2)} for {shown(drawn, 2)} mm)" if high < drawn - 0.05 else ""
+    )
     motor = "motor" if moulds.plan.makes == "unit" else "motors"
     without = "" if spec.motor.absent else f", without {motor} and circuit"
     closed = f", with the skin {shown(sum(masses_g) + skin_g)} g" if skin_g else ""
