@@ -165,8 +165,8 @@ def test_toml(place, long, law, folder):
 MESHES = sorted({name.rpartition(".")[2] for name, _ in inputs.meshes()})
 
 
-SLOW = {"polygon.obj", "polygon of many.obj", "star.obj"}
-"""Files of a face with 20,000 corners, and of hundreds of needles: their check takes longer, within its own limit."""
+SLOW = {"polygon.obj", "polygon of many.obj", "star.obj", "same face.obj", "one edge.obj"}
+"""A face of 20,000 corners, hundreds of needles, an edge or a face many times: a check may take longer than the law."""
 
 
 @both

@@ -103,8 +103,20 @@ def suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapp
     return next(one for one in every_fault(refusal, data, judge, sound) if one.field == refusal.field)
 
 
+_SEARCHED = 2_000
+"""Entries of data whose faults are all looked for: each is read a hundred times. A spec has some fifty."""
+
+
+def _entries(data: object) -> int:
+    """Return how many entries the tables and lists of data have."""
+    values = data.values() if isinstance(data, Mapping) else data if isinstance(data, list | tuple) else ()
+    return sum(1 + _entries(value) for value in values)
+
+
 def every_fault(first: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> list[Refusal]:
     """Return the faults of data, `first` among them, the one that was met. `sound`: see `suggest`."""
+    if _entries(data) > _SEARCHED:
+        return [first]
     try:
         every = faults(data, judge, sound)
     except RecursionError:  # nested too deeply to be looked through again
