@@ -158,7 +158,8 @@ def test_toml(place, long, law, folder):
     (folder / "special/pipe.stl").symlink_to(special["pipe"].name)
     put(folder, "itself.toml", inputs.ARRAYS["itself"] if "array" in kinds else inputs.SWEEPS["itself"])
     skipped = {"spec sound"} if words == ["accuracy"] else set()
-    runs = [call(words, option, put(folder, f"{n}.toml", t)) for n, t in [*own.items(), *others] if n not in skipped]
+    tried = [*_some(list(own.items()), number, long), *others]
+    runs = [call(words, option, put(folder, f"{n}.toml", t)) for n, t in tried if n not in skipped]
     assert judged(law, runs, folder) == {}
 
 
