@@ -65,6 +65,8 @@ def in_layers(spec: Spec, dims: Dimensions) -> Dimensions:
             target = layers.up(height)
         heights.append(kept(height, target, 0.0))
         below = target, height
+    if not any(capped):  # a core below its rim would leave a film over the ring's opening
+        core = max(core, *heights)
     exit = dims.exit
     if exit and exit.high >= dims.heights[0] - EPS:  # a notch stays open at the top
         exit = replace(exit, high=heights[0])

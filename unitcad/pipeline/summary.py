@@ -56,8 +56,8 @@ def as_printed(casting: Mapping[str, Any]) -> str:
     if total is None or all(abs(each["printed_mm"] - each["asked_mm"]) <= near for each in (total, *caps)):
         return ""
     drawn, printed = (number(total[key], 3) for key in ("asked_mm", "printed_mm"))
-    thick = join_words(number(each["printed_mm"], 3) for each in caps)
-    named = f", cap{'s' * (len(caps) > 1)} {thick}" if caps else ""
+    thick = [number(each["printed_mm"], 3) for each in caps]
+    named = f", cap{'s' * (len(caps) > 1)} {join_words(thick)}" if caps else ""
     return f"{printed} mm high (drawn {drawn}){named}"
 
 
