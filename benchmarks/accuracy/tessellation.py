@@ -10,7 +10,8 @@ import numpy as np
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.measures import mesh_volume
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
-from unitcad.accuracy.measurements import TOLERANCES, Mesh, Timing, distance, interleaved
+from unitcad.accuracy.measurements import TOLERANCES, Mesh, Timing, interleaved
+from unitcad.accuracy.occt_distance import distance
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape

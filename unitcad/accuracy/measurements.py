@@ -127,6 +127,8 @@ def mesh_rows(moulds: MouldSet, say: Callable[[str], object], repeats: int = 3) 
         less = [bounds.volume_bound(shape, segments[tolerance]) / v for shape, v in zip(shapes, volumes, strict=True)]
         row |= {"distance_bound_mm": max(off), "volume_bound": max(less), "distance_mm": None, "volume": None}
         if exact:
+            from unitcad.accuracy.occt_distance import distance
+
             far = [distance(v, f, exact[s][0], SAMPLES) for s, (v, f) in zip(shapes, timed.value, strict=True)]
             wrong = [abs(v / exact[s][1] - 1) for s, v in zip(shapes, volumes, strict=True)]
             worst = max(range(len(far)), key=far.__getitem__)
@@ -147,36 +149,6 @@ def _exact(shapes: Sequence[Shape]) -> dict[Shape, tuple[Any, float]]:
     from unitcad.kernels import occt
 
     return {s: (solid, occt.volume(solid)) for s, solid in zip(shapes, occt.solids(shapes), strict=True)}
-
-
-def distance(vertices: np.ndarray, faces: np.ndarray, brep: Any, samples: int) -> float:
-    """Return how far (mm) the farthest of `samples` vertices, edge middles and face centres is from a solid's faces."""
-    from OCP.BRep import BRep_Builder
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-    from OCP.gp import gp_Pnt
-    from OCP.TopAbs import TopAbs_FACE
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS_Compound
-
-    # Faces, not the solid: from inside a solid every distance is zero.
-    skin, builder = TopoDS_Compound(), BRep_Builder()
-    builder.MakeCompound(skin)
-    explorer = TopExp_Explorer(brep, TopAbs_FACE)
-    while explorer.More():
-        builder.Add(skin, explorer.Current())
-        explorer.Next()
-    corners = vertices[faces]
-    points = np.concatenate([vertices, (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2, corners.mean(1)])
-    sampled = points[np.random.default_rng(0).permutation(len(points))[:samples]]
-    extrema = BRepExtrema_DistShapeShape()
-    extrema.LoadS1(skin)
-    farthest = 0.0
-    for x, y, z in sampled.tolist():
-        extrema.LoadS2(BRepBuilderAPI_MakeVertex(gp_Pnt(x, y, z)).Vertex())
-        extrema.Perform()
-        farthest = max(farthest, extrema.Value())
-    return farthest
 
 
 RTOLS = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)
