@@ -25,22 +25,23 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
     """
     columns = row(spec, manifest)
     parts = [part for part in manifest["parts"] if part["role"] == "unit"]
+    casting = read_json(folder / "casting.json") if manifest["casting"] else None
     if parts:
         high, alone = _height(parts), _height([part for part in parts if part["made"] != "bought"])
         circuit = f" with its circuit, {alone} without" if alone != high and spec.fpcb else ""
         mass = columns.get("silicone_mass_g")
         silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
-        cells = read_json(folder / "casting.json")["cells"] if manifest["casting"] else 1
+        cells = casting["cells"] if casting else 1
         each = f"{cells} units, each " if cells > 1 else ""
         cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
         across = " x ".join(number(width, 3) for width in widths(spec, cast))
-        made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
+        made = as_printed(casting) if casting else ""
         if made and circuit:
             made += f", {high} with its circuit"
         yield f"{each}{across} mm across, {made or f'{high} mm high{circuit}'}{silicone}"
     yield from assumed_line(spec, given)
-    if manifest["casting"]:
-        yield from casting_summary(read_json(folder / "casting.json"))
+    if casting:
+        yield from casting_summary(casting)
     yield from checks_line(manifest)
     if level := manifest["estimate"]:
         yield level["line"]
