@@ -21,13 +21,8 @@ def parse_message(content: bytes | str, kind: type[T], name: str = "the message"
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
-        raise UnitcadError(f"{name}: {misfit(error)}: {_why(error)}") from None
-
-
-def _why(error: Exception) -> str:
-    """Return msgspec's reason as the end of a sentence."""
-    text = str(error).removeprefix("JSON is malformed: ").replace("Input data was truncated", "it ends too early")
-    return text[:1].lower() + text[1:]
+        why = str(error)
+        raise UnitcadError(f"{name}: {misfit(error)}: {why[:1].lower()}{why[1:]}") from None
 
 
 _FAST = msgspec.json.Encoder()

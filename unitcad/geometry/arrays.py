@@ -83,12 +83,6 @@ def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
     return low.T, high.T
 
 
-def group_labels(label: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """Return the places of labels 0 to n - 1, grouped by label, with the start and the count of each group."""
-    count = np.bincount(label, minlength=n)
-    return np.argsort(label, kind="stable").astype(np.int32), np.cumsum(count) - count, count
-
-
 def columns_of(rows: Floats, order: Ints) -> Floats:
     """Return some rows of (n, k) numbers, by their places (m,), as columns (k, m)."""
     columns = np.empty((rows.shape[1], len(order)), rows.dtype)
