@@ -19,11 +19,14 @@ from unitcad.cli.tables import console
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
+from unitcad.json_text import rounded
 from unitcad.pipeline.subjects import load_subject
 
 _MEDIA, _SPECS = 20, 20
 _INPUTS = 8
 """Inputs in the table of amplifications; JSON has all."""
+EXACT = 17
+"""Significant digits that keep every number as it is."""
 _MESHES = {
     "tolerance_mm": "tolerance",
     "triangles": "triangles",
@@ -94,7 +97,7 @@ def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
         say("requests")
         data["skipped"] = skipped_rows(subject)
     if as_json:
-        print_json(_finite(data))
+        print_json(rounded(data, EXACT))
     else:
         _print_spec(data)
     broken = not all(row.get("within_bounds", True) for row in data["meshes"])
@@ -108,7 +111,7 @@ def _survey(media: int, specs: int, seed: int, as_json: bool) -> None:
     with progress("accuracy") as say:
         data = {"media": survey_media(media, seed, say), "specs": survey_specs(specs, seed, say)}
     if as_json:
-        print_json(_finite(data))
+        print_json(rounded(data, EXACT))
     else:
         _table("Random media by rtol", {"rtol": "rtol", **_MEDIA_HEADS}, data["media"]["by_rtol"])
         _table("Random media by class", {"class": "class", **_MEDIA_HEADS}, data["media"]["by_class"])
@@ -168,12 +171,3 @@ def _line(text: str) -> None:
 
 def _shown(value: Any) -> str:
     return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-def _finite(data: Any) -> Any:
-    """Return data with None for each number that JSON does not have."""
-    if isinstance(data, dict):
-        return {name: _finite(value) for name, value in data.items()}
-    if isinstance(data, list):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not abs(data) < float("inf") else data
