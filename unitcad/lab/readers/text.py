@@ -173,12 +173,12 @@ def _longest_runs(lines: list[str], dialect: Block, skip: int) -> list[Block]:
         fresh = dialect.row(line, len(kinds))[1]
         if open_end and len(fresh) == len(kinds) + 1:  # the run began with lines whose last cell is empty
             kinds = (*kinds, "")
-        mixed = len(fresh) == len(kinds) and fresh != kinds
-        if len(fresh) != len(kinds) or (mixed and any({*two} == {"n", "t"} for two in zip(fresh, kinds, strict=True))):
-            start, count, kinds, open_end = i, 0, fresh, dialect.delimiter != " "
-        open_end = open_end and line.endswith(dialect.delimiter)
         if fresh != kinds:
-            kinds = tuple(one or other for one, other in zip(kinds, fresh, strict=True))
+            if len(fresh) != len(kinds) or any({*two} == {"n", "t"} for two in zip(fresh, kinds, strict=True)):
+                start, count, kinds, open_end = i, 0, fresh, dialect.delimiter != " "
+            else:
+                kinds = tuple(one or other for one, other in zip(kinds, fresh, strict=True))
+        open_end = open_end and line.endswith(dialect.delimiter)
         count += 1
         words = kinds.count("t")
         if kinds and words <= kinds.count("n") and (bool(words) not in best or count > best[bool(words)].lines):
