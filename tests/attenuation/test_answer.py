@@ -246,6 +246,8 @@ def test_a_custom_design_has_no_level_by_the_same_mechanism(name):
     assert first_line(found).startswith("No level at the edge: the rule knows embedded and encapsulating units only.")
     shown = CliRunner().invoke(app, ["estimate", f"custom/{name}"])
     assert first_line(found) in shown.output
+    assert shown.output.count(found.reason) == 1
+    assert "The paper's analytic model gives no number either." in shown.output
     assert shown.exit_code == 0
     data = estimate_spec(spec)
     json.dumps(data, allow_nan=False)

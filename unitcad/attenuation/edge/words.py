@@ -82,6 +82,8 @@ def source_line(one: Answer) -> str:
 def analytic_line(one: Answer) -> str:
     """Return the level by the paper's analytic model, and its error."""
     if one.published.low is None:
+        if one.published.reason == one.reason:  # the line of the level has it
+            return "The paper's analytic model gives no number either."
         return f"The paper's analytic model gives no number: {one.published.reason}."
     error = f"a factor of {_factor(one.analytic_error)}"
     return f"The paper's analytic model gives {model_level(one.published)}. It misses a measured unit by {error}."
