@@ -200,5 +200,7 @@ def skin_lines(layered: dict[str, Any], places_mm: tuple[int, ...] = (5, 10, 20)
     ends = {r: spread(drive["u"]["low"][i], drive["u"]["high"][i]).removesuffix(" %") for r, i in places}
     told = [f"{percent(drive['u']['value'][i])} ({ends[r]}) after {r} mm" for r, i in places]
     yield f"On the skin ({layered['tissue']}), of the motion at the edge: {join_words(told)}."
+    if short := layered["not_reached"]:
+        yield f"The skin's curve does not reach its accuracy. {'. '.join(short)}."
     if "far" in layered:
         yield layered["far"]
