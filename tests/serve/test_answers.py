@@ -108,10 +108,10 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path):
         assert stages[0] == "0 of 2 variants"
         assert "1 of 2 variants" in stages or "2 of 2 variants" in stages
         assert stages[-1] == "page"
-        assert state["page"].partition("/")[2] == "sweep-2/results/report.html"
+        assert state["page"].partition("/")[2] == "sweep-2/sweep/report.html"
         assert own.send(f"/files/{state['page']}")[0] == 200
     folder = tmp_path / "out" / "sweep-2"
-    assert sorted(path.name for path in folder.iterdir()) == ["results", "spec.toml", "sweep.toml"]
+    assert sorted(path.name for path in folder.iterdir()) == ["spec.toml", "sweep", "sweep.toml"]
     swept = from_file(tomllib.loads((folder / "sweep.toml").read_text()), folder, "sweep")
     assert swept.axes == {"layers.0.wall_mm": [2.0, 3.0]}
     # Defaults follow the key's values: the base is the text itself.

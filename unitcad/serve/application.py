@@ -21,7 +21,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.json_text import parse_message
 from unitcad.report.page import page_data
-from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
+from unitcad.serve.jobs import Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
@@ -144,8 +144,8 @@ class Live:
         if all(value.is_integer() for value in values):
             values = [int(value) for value in values]  # a count of units takes no 3.0
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
-        # A folder of its own, which has the sweep file next to the results.
-        arguments = ["batch", "{sweep}", "-o", f"{{folder}}/{RESULTS}", "--report", *code]
+        # A folder of its own, which has the sweep file next to the results, in RESULTS: the file's name.
+        arguments = ["batch", "{sweep}", "-o", "{folder}", "--report", *code]
         # The base has only the keys of the text: defaults follow the key's values as they do on the page.
         files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
         state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.out), first)

@@ -89,10 +89,10 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
         The silicone layers, from the inside out; one is a single-layer control.
     motor : Motor or dict, optional
         The motor. Default: the part LCM0720A3463F.
-    fpcb : Fpcb or dict, optional
-        The flexible circuit. Default: none.
-    wires : Wires or dict, optional
-        Wires in place of a circuit. Default: none.
+    fpcb : Fpcb, dict or False, optional
+        The flexible circuit. Default: none, as False.
+    wires : Wires, dict or False, optional
+        Wires in place of a circuit. Default: none, as False.
     moulds, casting, estimate, output : Moulds, Casting, Estimate, Output or dict, optional
         Settings. Default: the defaults of each class.
     materials, motors, printers, tissue : mapping, optional
@@ -116,6 +116,8 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
     """
 
     motor: MotorSize = DERIVED
+    fpcb: FpcbTable | None = None
+    wires: WiresTable | None = None
     layers: tuple[CastLayer, ...]
 
     if TYPE_CHECKING:
@@ -129,8 +131,8 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
             layers: Sequence[LayerTable | _Keys],
             skin_mm: float = 0.0,
             motor: MotorTable | _Keys | bool = ...,
-            fpcb: FpcbTable | _Keys | None = None,
-            wires: WiresTable | _Keys | None = None,
+            fpcb: FpcbTable | _Keys | bool | None = None,
+            wires: WiresTable | _Keys | bool | None = None,
             moulds: MouldsTable | _Keys = ...,
             casting: CastingTable | _Keys = ...,
             estimate: EstimateTable | _Keys = ...,

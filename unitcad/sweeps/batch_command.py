@@ -92,8 +92,7 @@ def batch(
             "-o",
             "--out",
             metavar="DIR",
-            help="Folder of the batch, or s3://BUCKET/PREFIX for workers that share no disk. "
-            "Default: out/NAME-OF-THE-SWEEP.",
+            help="Parent of the batch's folder, or s3://BUCKET/PREFIX for workers that share no disk. Default: out.",
         ),
     ] = None,
     jobs: Annotated[
