@@ -20,7 +20,7 @@ from unitcad.documents import read_json
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.summary import assumed_line, checks_line, to_open
+from unitcad.pipeline.summary import as_printed, assumed_line, checks_line, to_open
 from unitcad.skin_map import MapFile
 from unitcad.text import number
 from unitcad.validation import compound_kind
@@ -32,7 +32,12 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
     """
     box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
-    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
+    made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
+    thick = f"{number(array.sheet.thickness_mm, 3)} mm thick{f', {made}' if made else ''}"
+    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {thick}"
+    for own in sorted(folder.glob("units/*/casting.json")) if manifest["casting"] else ():
+        if made := as_printed(read_json(own)):
+            yield f"unit {own.parent.name} is {made}"
     for unit in array.units:
         yield from assumed_line(unit, given, array.paths_of(unit)[0])
     if manifest["casting"]:

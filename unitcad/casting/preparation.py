@@ -18,7 +18,7 @@ from unitcad.casting.figures import (
 from unitcad.casting.plates import made_pieces, mould_plates
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import picture_path
-from unitcad.catalogue import Material, inhibitors
+from unitcad.catalogue import Material, Printer, inhibitors
 from unitcad.designs.limits import leaf_mm
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH
 from unitcad.moulds.cup import ribs, window_section
@@ -35,6 +35,7 @@ INFILL_PERCENT = 20
 SPARE = 2.0
 """Extra length of a piece of filament over its way through base and core, mm."""
 FOOT_MM = 0.2
+"""Elephant foot compensation of a printer whose entry has none, mm."""
 MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
 GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
@@ -46,7 +47,7 @@ def slicer_settings(moulds: MouldSet) -> dict[str, str]:
     if in_resin(moulds):
         return {}
     return {
-        "elefant_foot_compensation": f"{FOOT_MM if _has_foot(moulds) else 0:g}",
+        "elefant_foot_compensation": f"{foot_mm(printer_of(moulds.spec)) if _has_foot(moulds) else 0:g}",
         "fill_density": f"{INFILL_PERCENT}%",
         "layer_height": f"{moulds.spec.moulds.layer_mm:g}",
         "perimeters": str(PERIMETERS),
@@ -64,6 +65,11 @@ def print_description(moulds: MouldSet) -> str:
 def in_layers(lengths: MouldsTable) -> str:
     """Write the layers of the printer."""
     return f"layers {number(lengths.layer_mm, 3)}, first layer {number(lengths.first_layer_mm, 3)} mm"
+
+
+def foot_mm(printer: Printer) -> float:
+    """Return the elephant foot compensation of a printer, mm."""
+    return FOOT_MM if printer.elephant_foot_mm is None else float(printer.elephant_foot_mm)
 
 
 def _has_foot(moulds: MouldSet) -> bool:
@@ -132,7 +138,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
             "tolerance): it narrows a bore."
         )
     else:
-        foot = f", elephant foot compensation {number(FOOT_MM, 3)} mm" if _has_foot(moulds) else ""
+        foot = f", elephant foot compensation {number(foot_mm(printer_of(spec)), 3)} mm" if _has_foot(moulds) else ""
         low, high = (number(error, 2) for error in FDM_ERROR)
         how.append(f"{takes} filament (a slicer says {low} to {high} times that).")
         how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")

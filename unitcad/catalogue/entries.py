@@ -54,6 +54,9 @@ BoreCompensation = Annotated[
     float,
     between(0, 0.5, "by how much bores are printed too narrow, per side; files make up for it"),
 ]
+ElephantFoot = Annotated[
+    float, between(0, 1, "elephant foot compensation of the slicer, by which the first layer is drawn in, per side")
+]
 WindowClearance = Annotated[float, between(0.01, 5, "gap between the tongue and a cup's window, per side")]
 Wall = Annotated[float, between(0.05, 50, "thinnest wall that prints whole")]
 Skirt = Annotated[float, between(0.05, 50, "wall of a cup around its plinth")]
@@ -225,6 +228,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     first_layer_mm: Value[FirstLayer] | None = None
     rib_interference_mm: Value[RibInterference] | None = None
     bore_compensation_mm: Value[BoreCompensation] | None = None
+    elephant_foot_mm: Value[ElephantFoot] | None = None
     support: (
         Value[
             Annotated[Literal["printed", "none"], Meta(description="printed: under overhangs; none: an overhang fails")]
