@@ -258,7 +258,7 @@ def _drawing(path: Path) -> str:
 def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str]) -> ResultsTable:
     """Return a batch's table, as `batch` (its batch.json) lists it, else from the manifests.
 
-    Chosen values come first, then the levels at the edge, then the rest. `damaged` says by folder why a result
+    The levels at the edge come first, then chosen values, then the rest. `damaged` says by folder why a result
     can't be read.
     """
     if batch:
@@ -293,14 +293,16 @@ def _swept(columns: list[str]) -> set[str]:
 
 
 def _in_order(columns: list[str], swept: set[str]) -> list[str]:
-    """Order columns: name, swept values, the edge's levels, the rest."""
+    """Order columns: name, the edge's levels, swept values, the rest, the index."""
 
     def place(name: str) -> int:
         if name == "name":
             return 0
-        if name in swept:
+        if name.startswith("edge_"):
             return 1
-        return 2 if name.startswith("edge_") else 3
+        if name in swept:
+            return 2
+        return 4 if name == "index" else 3
 
     return sorted(columns, key=place)
 
