@@ -275,24 +275,24 @@ def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], d
             for entry in entries
         ]
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
-    swept = _swept(columns)
-    columns = _in_order(columns, swept)
+    swept = swept_columns(columns)
+    columns = in_order(columns, swept)
     there = {each.folder for each in variants}
     rows = [
-        [folder if (folder := entry.get("folder")) in there else "", *(_cell(entry.get(c)) for c in columns)]
+        [folder if (folder := entry.get("folder")) in there else "", *(cell(entry.get(c)) for c in columns)]
         for entry in entries
     ]
     return ResultsTable(columns, rows, [name for name in columns if name in swept])
 
 
-def _swept(columns: list[str]) -> set[str]:
+def swept_columns(columns: list[str]) -> set[str]:
     """Return the columns of chosen values: those before `name` in a batch; else the spec's."""
     before = columns[: columns.index("name")] if "name" in columns else []
     given = {name for name in columns if name in ("design", "diameter_mm") or name.startswith("layers.")}
     return {name for name in before if name not in OF_EVERY_BATCH} | given
 
 
-def _in_order(columns: list[str], swept: set[str]) -> list[str]:
+def in_order(columns: list[str], swept: set[str]) -> list[str]:
     """Order columns: name, the edge's levels, swept values, the rest, the index."""
 
     def place(name: str) -> int:
@@ -325,7 +325,7 @@ def _row(record: VariantRecord) -> dict[str, Any]:
     return row
 
 
-def _cell(value: Any) -> Any:
+def cell(value: Any) -> Any:
     """Return a cell that the page can sort: a number, a text, or None."""
     if value is None or value == "":
         return None
