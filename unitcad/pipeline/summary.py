@@ -49,17 +49,21 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
 
 
 def as_printed(casting: Mapping[str, Any]) -> str:
-    """Write the height over all and the caps as the printer makes them; "" if it makes them as drawn."""
+    """Write the height over all and the caps as the printer makes them; "" if it makes them as drawn.
+
+    A curved array has no height over all.
+    """
     heights = casting["unit_heights"]
     total = next((each for each in heights if each["what"] == OVER_ALL), None)
     caps = [each for each in heights if each["what"].endswith("'s cap")]
-    near = NEAR * casting["printing"]["layer_mm"]
-    if total is None or all(abs(each["printed_mm"] - each["asked_mm"]) <= near for each in (total, *caps)):
+    near, known = NEAR * casting["printing"]["layer_mm"], [*([total] if total else []), *caps]
+    if all(abs(each["printed_mm"] - each["asked_mm"]) <= near for each in known):
         return ""
-    drawn, printed = (number(total[key], 3) for key in ("asked_mm", "printed_mm"))
-    thick = [number(each["printed_mm"], 3) for each in caps]
-    named = f", cap{'s' * (len(caps) > 1)} {join_words(thick)}" if caps else ""
-    return f"{printed} mm high (drawn {drawn}){named}"
+    drawn, printed = ([number(each[key], 3) for each in known] for key in ("asked_mm", "printed_mm"))
+    named = f"cap{'s' * (len(caps) > 1)} {join_words(printed[-len(caps) :])}" if caps else ""
+    if total is None:
+        return f"{named} mm (drawn {join_words(drawn)})"
+    return f"{printed[0]} mm high (drawn {drawn[0]}){f', {named}' if named else ''}"
 
 
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
