@@ -4,15 +4,20 @@ import base64
 import json
 import time
 import tomllib
+from pathlib import Path
 
 import pytest
+from msgspec import structs
 from running import serving
 
 from unitcad.checks import check_moulds
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
-from unitcad.serve.messages import Field
+from unitcad.serve.application import values_of
+from unitcad.serve.messages import Field, Sweep
+from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load, templates
 
@@ -94,6 +99,16 @@ def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path):
         assert state["ended"]
         assert state["code"] != 0
         assert len(list((tmp_path / "made").glob("single-embedded-*"))) == 1
+
+
+def test_a_sweep_of_silicones_has_two_or_more_and_the_level_reads_it():
+    asked = Sweep(text="", key="layers.0.material", words=["ecoflex-00-10", "dragon-skin-30", "ecoflex-00-10"])
+    assert values_of(asked) == ["ecoflex-00-10", "dragon-skin-30"]
+    with pytest.raises(Refusal, match="two values or more"):
+        values_of(structs.replace(asked, words=["ecoflex-00-10"] * 2))
+    assert values_of(Sweep(text="", key="moulds.vents", low=4, high=8, count=3)) == [4, 6, 8]
+    data = {"base": "encapsulating", "sweep": {asked.key: values_of(asked)}}
+    assert swept_estimate(from_file(data, Path(), "sweep"), 2).unread == []
 
 
 def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path):

@@ -17,8 +17,7 @@ import numpy as np
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
-from unitcad.attenuation.curve import RANGE, contact, decay, ends, motion
-from unitcad.attenuation.inputs import Drive
+from unitcad.attenuation.curve import RANGE, contact, decay, ends, in_axes, motion
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.export.chart import coord
@@ -155,18 +154,6 @@ class Decays:
         low, high = contact(one.drive, away - 500.0 * one.diameter)
         rows = np.stack([found, found * low, found * high], axis=-1)
         return {"nearest_centre": rows[0], "nearest_edge": rows[1]}
-
-
-def in_axes(found: np.ndarray, angle: np.ndarray, drive: Drive) -> np.ndarray:
-    """Return u_r, u_theta and u_z (3, k) at angles (rad, (k,)) as the motion in x, y and z, shape (k, 3).
-
-    A flat motor's force turns: its phase is that of the angle, and u_theta is a quarter turn ahead.
-    """
-    out, around, up = found
-    if drive == "flat":
-        out, around, up = np.exp(-1j * angle) * np.array([out, 1j * around, up])
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.stack([out * cos - around * sin, out * sin + around * cos, up], axis=-1)
 
 
 _STARTS, _TURNS = 8, 40

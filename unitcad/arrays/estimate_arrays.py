@@ -11,6 +11,7 @@ from rich.text import Text
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_map import array_map
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.output import print_indented, print_json, progress
@@ -20,6 +21,7 @@ from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.summary import as_printed, assumed_line, checks_line, to_open
+from unitcad.skin_map import MapFile
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
@@ -54,9 +56,14 @@ _MOST_PLACES, _MOST_PAIRS = 64, 16
 
 
 def estimate_arrays(
-    names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool
+    names: Sequence[str],
+    sets: Sequence[str],
+    hertz: float | None,
+    details: bool,
+    as_json: bool,
+    wanted_map: MapFile | None = None,
 ) -> None:
-    """Print the crosstalk of arrays and, of several, each over the first."""
+    """Print the crosstalk of arrays and, of several, each over the first; write the map of one if it is wanted."""
     for name in names:
         if not compound_kind(name):
             raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
@@ -64,6 +71,10 @@ def estimate_arrays(
     arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]
     with progress("crosstalk") as stage:
         every = [crosstalk(array, stage) for array in arrays]
+        if wanted_map:
+            stage("map")
+            drawn = wanted_map.write(array_map(arrays[0], wanted_map.threshold_um, wanted_map.share))
+            every[0]["map"] = drawn.figures()
     compared = ratios(every)
     if as_json:
         print_json(every[0] if len(every) == 1 else {"arrays": every, "ratios": compared})
@@ -77,6 +88,8 @@ def estimate_arrays(
         rest = f": {counted(len(places), 'unit')} ({units}), {frequency}, {drives} drive, {data['tissue']}"
         screen.print(Text.assemble((data["array"], "bold"), rest))
         print_indented(*data["answer"])
+        if wanted_map:
+            print_indented(*data["map"]["lines"], f"Map: {wanted_map.path}")
         if details:
             _print_details(data)
     for one in compared:

@@ -116,12 +116,24 @@ def motion(
     gets the shortfall of a response. Raises `Refusal` for values that no tissue has.
     """
     wanted = np.asarray(radii, dtype=float)
-    medium, load, omega = _case(variant, drive or variant.drive, end or {})
+    medium, load, omega = case(variant, drive or variant.drive, end or {})
     found = components(medium, load, omega, np.append(wanted.ravel(), variant.diameter / 2.0), _RTOL, short)
     return (found[:, :-1] / np.linalg.norm(found[:, -1])).reshape(3, *wanted.shape)
 
 
-def _case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:
+def in_axes(found: np.ndarray, angle: np.ndarray, drive: Drive) -> np.ndarray:
+    """Return u_r, u_theta and u_z (3, k) at angles (rad, (k,)) as the motion in x, y and z, shape (k, 3).
+
+    A flat motor's force turns: its phase is that of the angle, and u_theta is a quarter turn ahead.
+    """
+    out, around, up = found
+    if drive == "flat":
+        out, around, up = np.exp(-1j * angle) * np.array([out, 1j * around, up])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([out * cos - around * sin, out * sin + around * cos, up], axis=-1)
+
+
+def case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:
     """Return the medium, the load and omega of a drive; `end` as `decay` takes it."""
     frequency = variant.frequency
     hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
@@ -139,7 +151,7 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     """
 
     def response(drive: Drive, end: Mapping[str, int]) -> Response:
-        medium, load, omega = _case(variant, drive, end)
+        medium, load, omega = case(variant, drive, end)
         return medium.response(load, omega, r, rtol=rtol)
 
     r_mm = np.arange(EDGE_TO_MM + 1)

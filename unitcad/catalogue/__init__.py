@@ -37,6 +37,7 @@ from unitcad.catalogue.entries import (
     PrinterEntry,
     Tissue,
     TissueEntry,
+    Touch,
     Value,
     kinds_of,
     required_of,
@@ -58,6 +59,7 @@ __all__ = [
     "PrinterEntry",
     "Tissue",
     "TissueEntry",
+    "Touch",
     "Value",
     "choose",
     "contact",
@@ -71,6 +73,7 @@ __all__ = [
     "surface_contact",
     "tissue",
     "tissues",
+    "touch",
 ]
 
 _Entry = TypeVar("_Entry", Material, Motor, Printer)
@@ -218,6 +221,20 @@ def tissues() -> Mapping[str, tuple[Tissue, ...]]:
     ['forearm', 'upper-arm', 'palm', 'rigid-plate', 'gel-50kpa']
     """
     return {name: tissue(name) for name in _raw("tissue.toml")}
+
+
+@cache
+def touch() -> Mapping[str, Touch]:
+    """Return the thresholds of touch by the name of the tissue.
+
+    Examples
+    --------
+    >>> from unitcad import catalogue
+    >>> forearm = catalogue.touch()["forearm"]
+    >>> forearm.site.value, [round(um, 2) for um in forearm.at(220)], forearm.threshold_um.status
+    ('volar forearm, hairy skin', [1.0, 0.3, 3.0], 'assumed')
+    """
+    return {name: _entry(Touch, name, table, f"touch.{name}") for name, table in _raw("touch.toml").items()}
 
 
 @cache

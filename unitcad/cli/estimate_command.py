@@ -82,6 +82,22 @@ def estimate(
             metavar="FILE.svg", help="Draw levels, 80 % ranges and measurements as a dot plot. Default: none."
         ),
     ] = None,
+    map_file: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="FILE", help="Map of the skin's motion, .svg or .png. Default: none."),
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            metavar="UM", min=1e-3, max=1e4, help="Threshold of touch of the map. Default: the published one there."
+        ),
+    ] = None,
+    share: Annotated[
+        float,
+        typer.Option(
+            metavar="PERCENT", min=0.01, max=100, help="Share of the edge's motion, for the least pitch of the map."
+        ),
+    ] = 10.0,
     details: Annotated[
         bool, typer.Option("--details", help="Print models, errors, slopes, the skin's curve and assumptions.")
     ] = False,
@@ -91,7 +107,8 @@ def estimate(
 
     The first line has the level in per cent of the motor's amplitude, its 80 % range in brackets, and the measurement
     if this unit was measured. The next lines have the model behind it with its error, and the paper's analytic model.
-    Several specs are a table, each compared with the first. For an array: the share of a unit's motion at its
+    Several specs are a table, each compared with the first. --map draws the skin's motion and the line where it is no
+    longer felt, and prints the felt radius and the least pitch. For an array: the share of a unit's motion at its
     neighbours.
     """
 
@@ -99,13 +116,22 @@ def estimate(
         raise unknown_name("--model", model, (*MODELS, FEM, "all"))
     models = None if not model else MODELS if model == "all" else (model,)
     specs = [confirm_known(name) for name in specs]
+    wanted_map = None
+    if map_file is not None:
+        from unitcad.skin_map import MapFile  # loads Pillow
+
+        if len(specs) > 1:
+            raise Refusal("--map", str(map_file), "is a picture of one SPEC; give one")
+        wanted_map = MapFile(map_file, threshold, share / 100.0)
+    elif threshold is not None:
+        raise Refusal("--threshold", threshold, "is for the map: give --map FILE")
     kinds = [kind for kind in map(compound_kind, specs) if kind]
     if kinds:
         if model:
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
         if svg:
             raise Refusal("--svg", str(svg), "the plot has levels of units, and an array has crosstalk")
-        return load_named(kinds[0].estimate)(specs, with_fit(sets, fit), frequency, details, as_json)
+        return load_named(kinds[0].estimate)(specs, with_fit(sets, fit), frequency, details, as_json, wanted_map)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
     if svg and svg.suffix.lower() != ".svg":
         raise Refusal("--svg", str(svg), "takes the name of a file that ends in .svg", str(svg.with_suffix(".svg")))
@@ -117,6 +143,8 @@ def estimate(
     if as_json:
         with progress("estimate") as stage:
             estimates = [estimate_spec(spec, models, frequency, say=stage) for spec in loaded]
+            if wanted_map:
+                estimates[0]["map"] = wanted_map.of_unit(loaded[0], frequency).figures()
         print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
         return
 
@@ -141,6 +169,10 @@ def estimate(
             from unitcad.cli.estimate_details import print_estimate  # loads rich for its tables
 
             print_estimate(data, details)
+    if wanted_map:
+        with progress("map"):
+            made = wanted_map.of_unit(loaded[0], frequency)
+        print_indented(*made.lines, f"Map: {wanted_map.path}")
     if several and not last:
         for sentence in dict.fromkeys(source_line(one) for one in answers if one.low is not None):
             typer.echo(sentence)

@@ -94,6 +94,7 @@ def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
         "tissue": lambda: _values(
             {f"{name}.{one.name}": one for name, of in catalogue.tissues().items() for one in of}
         ),
+        "touch": lambda: _values(dict(catalogue.touch())),
         "rules": lambda: {code: f"{rule.severity}: {rule.title}" for code, rule in rules().items()},
     }
 

@@ -53,7 +53,7 @@
     const batch = data.batch && createBatch(data.batch);
     const view = section("view", "3D", figures, glance, others, host);
     const pinned = U.createPinned({ current, restore: replaceText, before: kept.pinned, keep });
-    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
+    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers, silicones });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
     clear(page,
       el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, jobs.button, theme.button())),
@@ -79,6 +79,13 @@
 
     function numbers() {
       return state.groups.flatMap((group) => group.fields).filter((field) => ["number", "integer"].includes(field.kind) && typeof field.value === "number");
+    }
+
+    // Keys of one word of several that a unit's silicones are: what the level reads. `usual` are the silicones whose
+    // modulus is known, with the one that is there.
+    function silicones() {
+      const fields = state.groups.flatMap((group) => group.fields).filter((field) => field.kind === "word" && /(^|\.)layers\.\d+\.material$/.test(field.path));
+      return fields.map((field) => ({ ...field, usual: field.choices.filter(([name, modulus]) => name === field.value || /^[\d.]+ kPa$/.test(modulus)).map(([name]) => name) }));
     }
 
     // Another motor brings its own size and drive: those of the text go.
