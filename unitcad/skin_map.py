@@ -24,7 +24,7 @@ from unitcad.attenuation.radial import TERMS, WANTED, RadialTable, radial_table
 from unitcad.catalogue import touch
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_input
-from unitcad.export.field import Circle, Field, field_picture
+from unitcad.export.field import DECADES, SCALE, Circle, Field, field_picture
 from unitcad.spec import Spec
 from unitcad.text import join_words, number
 
@@ -321,13 +321,16 @@ def amplitude(
 _table: Callable[[Kind], RadialTable] = lru_cache(maxsize=64)(table_of)
 
 
-def map_data(made: SkinMap) -> bytes:
-    """Return a map as JSON for a page. Raises `Refusal` if it is larger than a page may carry."""
-    content = msgspec.json.encode(made)
-    if len(content) > 1000 * LARGEST_KB:
-        limit = f"its map of {len(made.kinds)} kinds of units has {len(content) // 1000} kB, the most is {LARGEST_KB}"
+def map_data(made: SkinMap) -> dict[str, Any]:
+    """Return a map as JSON-ready data for a page, with the constants of its formula and its colours.
+
+    Raises `Refusal` if it is larger than a page may carry.
+    """
+    size = len(msgspec.json.encode(made))
+    if size > 1000 * LARGEST_KB:
+        limit = f"its map of {len(made.kinds)} kinds of units has {size // 1000} kB, the most is {LARGEST_KB}"
         raise Refusal("array", made.name, limit)
-    return content
+    return {**msgspec.to_builtins(made), "terms": TERMS, "unit": UNIT, "scale": SCALE, "decades": DECADES}
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,13 @@
 """The map of an array: against a direct superposition of the solver, which shares no code with it; and on a limb."""
 
+import base64
+import gzip
 import json
 import math
+import re
+import shutil
+import subprocess
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -12,8 +18,11 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_map import array_map
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.inputs import tissue_medium
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_input
-from unitcad.skin_map import amplitude
+from unitcad.pipeline.write import build as build_array
+from unitcad.report import write_report
+from unitcad.skin_map import amplitude, map_data, table_of
 
 UNIT = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
 
@@ -104,6 +113,87 @@ def test_motors_of_several_frequencies_add_without_phase():
     for phase in (0.0, 180.0):
         assert amplitude(made, *at, {"P1": 0.0, "P2": phase})[0][0] == pytest.approx(math.hypot(*apart))
     assert any("no phase lasts" in line for line in made.lines)
+
+
+NODE = """
+const fs = require("fs"), vm = require("vm");
+const context = vm.createContext({ window: { unitcad: {} }, console });
+vm.runInContext(fs.readFileSync(process.argv[2], "utf8"), context);
+const { map, x, y, phases, shares } = JSON.parse(fs.readFileSync(process.argv[3], "utf8"));
+const { motion, lastAbove, createField, amplitude, contour } = context.window.unitcad.skinMap;
+const total = new Float64Array(6 * x.length), out = new Float64Array(6);
+map.places.forEach((place) => {
+  if (!(place.name in phases)) return;
+  const [re, im] = [Math.cos(phases[place.name] * Math.PI / 180), Math.sin(phases[place.name] * Math.PI / 180)];
+  x.forEach((_, i) => {
+    motion(map, place, x[i], y[i], out);
+    for (let k = 0; k < 6; k += 2) {
+      total[6 * i + k] += re * out[k] - im * out[k + 1];
+      total[6 * i + k + 1] += re * out[k + 1] + im * out[k];
+    }
+  });
+});
+const field = createField(map);
+const sums = field.sums(map.places.map(({ name }) => ({ on: name in phases, phase: phases[name] || 0 })));
+const limit = map.kinds[0].threshold.um.value;
+console.log(JSON.stringify({
+  amplitude: [...amplitude([total])],
+  last: map.kinds.map((kind) => shares.map((share) => lastAbove(map, kind, share))),
+  grid: [field.columns, field.rows, [...amplitude(sums)]],
+  contour: contour(amplitude(sums, [limit]), field.columns, field.rows),
+}));
+"""
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_page_s_program_has_the_map_of_python(tmp_path):
+    """Its motion at 100 random points, its last radii, its grid and its contour; the data through JSON."""
+    made = array_map(three())
+    rng = np.random.default_rng(11)
+    x, y = rng.uniform(*made.box_mm[::2], 100), rng.uniform(*made.box_mm[1::2], 100)
+    phases, shares = {"P1": 0.0, "P3": 250.0}, [0.5, 0.1, 40.0, 1e-9]
+    asked = {"map": map_data(made), "x": x.tolist(), "y": y.tolist(), "phases": phases, "shares": shares}
+    (tmp_path / "asked.json").write_text(json.dumps(asked))
+    (tmp_path / "run.js").write_text(NODE)
+    program = resources.files("unitcad.report") / "app" / "skinmap.js"
+    run = ["node", str(tmp_path / "run.js"), str(program), str(tmp_path / "asked.json")]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    expected, _ = amplitude(made, x, y, phases)
+    assert np.max(np.abs(found["amplitude"] - expected)) < 1e-12 * expected.max()
+    for kind, last in zip(made.kinds, found["last"], strict=True):
+        assert last[:2] == pytest.approx([1e3 * table_of(kind).last_above(share) for share in shares[:2]], abs=1e-9)
+        assert last[2:] == [0, None]
+    columns, rows, values = found["grid"]
+    x0, y0, x1, y1 = made.box_mm
+    grid = np.meshgrid(np.linspace(x0, x1, columns), np.linspace(y0, y1, rows))
+    whole, _ = amplitude(made, *grid, phases)
+    assert np.array(values).reshape(rows, columns) == pytest.approx(whole, abs=1e-6 * whole.max())
+    ends = np.array(found["contour"]).reshape(-1, 2) * [(x1 - x0) / (columns - 1), (y1 - y0) / (rows - 1)] + [x0, y0]
+    _, felt = amplitude(made, *ends.T, phases)
+    assert felt == pytest.approx(np.ones(len(ends)), rel=0.02)
+
+
+def test_a_page_carries_the_map(tmp_path):
+    """With crosstalk it has the section and at most 200 kB of data; without crosstalk, or with own code, no map."""
+    pair = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 10]", "output.formats=[]"]
+    array = load_array("forearm-pockets", pair)
+    folder = build_array(array, tmp_path, only=["unit", "estimate"], check=False).folder
+    page = write_report(folder).read_text()
+    assert "Motion of the skin" in page
+    (packed,) = re.findall(r'id="data">([^<]+)<', page)
+    data = json.loads(gzip.decompress(base64.b64decode(packed)))["skin_map"]
+    assert [place["name"] for place in data["places"]] == ["A1", "A2"]
+    assert len(json.dumps(data, separators=(",", ":"))) < 200_000
+    (folder / "crosstalk.json").unlink()
+    assert "Motion of the skin" not in write_report(folder).read_text()
+
+
+def test_a_map_that_is_too_large_for_a_page_is_refused(monkeypatch):
+    monkeypatch.setattr("unitcad.skin_map.LARGEST_KB", 20)
+    with pytest.raises(Refusal, match=r"its map of 2 kinds of units has \d+ kB, the most is 20"):
+        map_data(array_map(three()))
 
 
 def test_the_command_writes_an_arrays_map(tmp_path):

@@ -7,8 +7,6 @@ import math
 from unitcad.arrays.array import Array
 from unitcad.skin_map import SHARE, SkinMap, skin_map
 
-SKIN_MAP = "skin-map.json"
-
 
 def array_map(array: Array, threshold_um: float | None = None, share: float = SHARE) -> SkinMap:
     """Return the map of an array; x is along the skin, unrolled if the array is worn around a limb.

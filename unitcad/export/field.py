@@ -20,7 +20,7 @@ from unitcad.export.raster import encode_png, picture_font
 
 DECADES = 2.0
 """Decades of the scale below the largest value."""
-_SCALE = ((13, 27, 62), (32, 82, 138), (41, 143, 158), (134, 203, 146), (251, 246, 190))
+SCALE = ((13, 27, 62), (32, 82, 138), (41, 143, 158), (134, 203, 146), (251, 246, 190))
 """Colours from the least to the largest value: their lightness grows steadily."""
 CONTOUR, _EDGE, _INK = "#ff6a13", "#ffffff", "#111111"
 _WIDE, _LEFT, _SIZE, _LINE = 640.0, 14.0, 12, 17.0
@@ -66,8 +66,8 @@ def shades(values: np.ndarray, largest: float) -> np.ndarray:
     """Return the colours of values, bytes of shape (..., 3); those below the scale have its darkest colour."""
     with np.errstate(divide="ignore"):
         share = np.log10(np.asarray(values, dtype=float) / (largest or 1.0)) / DECADES + 1.0
-    place = np.clip(share, 0.0, 1.0) * (len(_SCALE) - 1)
-    channels = [np.interp(place, range(len(_SCALE)), [colour[i] for colour in _SCALE]) for i in range(3)]
+    place = np.clip(share, 0.0, 1.0) * (len(SCALE) - 1)
+    channels = [np.interp(place, range(len(SCALE)), [colour[i] for colour in SCALE]) for i in range(3)]
     return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
 
 

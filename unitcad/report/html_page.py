@@ -158,7 +158,10 @@ def _hash(text: str) -> str:
 _STYLES = ("app/page.css", "app/print.css")
 
 
-_PROGRAMS = ("vendor/three.min.js", *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "array")))
+_PROGRAMS = (
+    "vendor/three.min.js",
+    *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "skinmap", "array")),
+)
 VIEW = '<div class="stage-host"><p class="absent">A script draws the 3D view.</p></div>'
 
 

@@ -1,4 +1,4 @@
-// The page of an array: its markup is there; this draws the 3D view into it.
+// The page of an array: its markup is there; this draws the 3D view and the skin's motion into it.
 (() => {
   "use strict";
   const U = window.unitcad;
@@ -6,6 +6,8 @@
 
   async function start() {
     const model = JSON.parse(new TextDecoder().decode(await U.unpacked(document.getElementById("data").textContent)));
+    const map = document.querySelector(".skin-map-host");
+    if (map && model.skin_map) U.createSkinMap(map, model.skin_map);
     await U.createStage(host, model);
   }
 
