@@ -247,7 +247,7 @@ def _chips(manifest: ArrayManifest) -> str:
     findings, check = manifest["mould_checks"], manifest["check"]
     passed = sum(each["ok"] for each in findings)
     good = passed == len(findings) and not check["errors"]
-    chips = [f"{passed} of {len(findings)} mould checks passed"] if findings else ["not checked"]
+    chips = [f"checks: {passed} of {len(findings)}"] if findings else ["checks: not run"]
     chips.append(f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files")
     marked = "".join(f'<li class="chip {"good" if good else "bad"}">{escape(text)}</li>' for text in chips)
     return f'<ul class="chips">{marked}</ul>'

@@ -48,6 +48,7 @@ from unitcad.text import measured, some
 
 __all__ = [
     "FREQUENCIES_HZ",
+    "RESIN",
     "Contact",
     "Material",
     "MaterialEntry",
@@ -69,6 +70,7 @@ __all__ = [
     "motors",
     "needed",
     "printers",
+    "surface_contact",
     "tissue",
     "tissues",
     "touch",
@@ -301,10 +303,27 @@ def contact(poured: Material, on: Material) -> Contact | None:
     return next((one for one in contacts() if (one.poured, one.on) == pair), None)
 
 
+RESIN = "printed resin"
+"""The surface of tools from a printer of resin: a printer's choice, so no item to keep away."""
+
+
+def surface_contact(poured: Material, surface: str) -> Contact | None:
+    """Return what a fresh silicone does on a surface that is no silicone; None if no source says.
+
+    Examples
+    --------
+    >>> from unitcad import catalogue
+    >>> catalogue.surface_contact(catalogue.materials()["ecoflex-00-30"], catalogue.RESIN).result
+    'inhibited'
+    """
+    chemistry = poured.chemistry and poured.chemistry.value
+    return next((one for one in contacts() if (one.poured, one.on) == (chemistry, surface)), None)
+
+
 def inhibitors(silicones: Iterable[Material]) -> tuple[str, ...]:
     """Return the surfaces, other than silicones, on which one of these silicones does not cure."""
     chemistries = {each.chemistry.value for each in silicones if each.chemistry}
-    found = [one for one in contacts() if one.result == "inhibited" and one.on not in CHEMISTRIES]
+    found = [one for one in contacts() if one.result == "inhibited" and one.on not in (*CHEMISTRIES, RESIN)]
     return tuple(dict.fromkeys(one.on for one in found if one.poured in chemistries))
 
 
