@@ -89,6 +89,7 @@ def _entries() -> Iterator[str]:
         "motors": catalogue.motors,
         "printers": catalogue.printers,
         "tissue": catalogue.tissue,
+        "touch": catalogue.touch,
     }
     for name, entries in tables.items():
         yield from (f"{name}: {entry}" for entry in sorted(getattr(one, "name", one) for one in entries()))

@@ -28,7 +28,7 @@ FLOORS = [
     {"api"},
     {"report"},
     {"pipeline"},
-    {"casting", "checks"},
+    {"casting", "checks", "skin_map"},
     {"moulds", "estimate_inputs"},
     {"validation"},
     {"export"},
@@ -209,9 +209,9 @@ def test_no_piece_is_recognised_by_its_name():
 
 NOT_OF_AN_ESTIMATE = (
     "scipy.optimize", "scipy.linalg", "trimesh", "rich", "manifold3d", "unitcad.moulds", "unitcad.meshcheck",
-    "unitcad.attenuation.edge.scoring",
+    "unitcad.attenuation.edge.scoring", "unitcad.skin_map", "unitcad.attenuation.radial", "PIL",
 )  # fmt: skip
-"""Its lines need numpy, scipy.special and the stored scores: no tools, no mesh rules, no fits, no tables."""
+"""Its lines need numpy, scipy.special and the stored scores: no tools, no mesh rules, no fits, no tables, no map."""
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,10 @@ def _features(spec: Spec, layers: tuple[TissueLayer, ...]) -> Iterator[Feature]:
 
 @lru_cache(maxsize=64)
 def _other_tissue(layers: tuple[TissueLayer, ...], diameter: float, motor: float) -> float:
-    """Return |ln| of a tissue's compliance at a unit's edge over that of the tissue that stands for the phantom."""
+    """Return |ln| of a tissue's compliance at a unit's edge over that of the tissue that stands for the phantom.
+
+    An error beyond rtol, if the solver does not reach it, is added.
+    """
     usual = tuple(map(tissue_layer, tissue(measurements().unit.tissue)))
     if layers == usual:
         return 0.0
@@ -158,7 +161,8 @@ def _other_tissue(layers: tuple[TissueLayer, ...], diameter: float, motor: float
         for one in (layers, usual)
     ]
     here, there = (abs(one.u_z[0]) for one in moved)
-    return abs(math.log(max(here, 1e-300) / there))
+    beyond = sum(max(one.error_z[0] / max(abs(one.u_z[0]), 1e-300) - one.rtol, 0.0) for one in moved if not one.reached)
+    return abs(math.log(max(here, 1e-300) / there)) + float(beyond)
 
 
 def _geometry(spec: Spec, motor_mass: Quantity) -> Geometry:

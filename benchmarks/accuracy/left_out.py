@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.measurements import EVERYTHING, REQUESTS, Timing, time_requests
+from unitcad.accuracy.measurements import EVERYTHING, REQUESTS, Timing, saving, time_requests
 from unitcad.pipeline.unit import Unit
 from unitcad.validation import default_template, load, templates
 
@@ -58,8 +58,9 @@ def row(request: str, templates: Sequence[dict[str, Timing]]) -> tuple[Cell, ...
     saved, differ, files = [], 0, 0
     for times in templates:
         one, whole = times[request], times[EVERYTHING]
-        if one.high < whole.low:
-            saved.append(1 - one.median / whole.median)
+        less = saving(one, whole)
+        if less is not None:
+            saved.append(less / whole.median)
         own, other = one.value["files"], whole.value["files"]
         both = (own.keys() & other.keys()) - {"spec.toml"}  # it names the formats
         files += len(both)

@@ -27,10 +27,12 @@ from running import serving  # noqa: E402
 
 from unitcad import Variant  # noqa: E402
 from unitcad.arrays.array_file import load_array  # noqa: E402
+from unitcad.arrays.array_map import array_map  # noqa: E402
 from unitcad.arrays.array_page import pictures as patch_pictures  # noqa: E402
 from unitcad.arrays.crosstalk import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch import patch_moulds  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
+from unitcad.export.field import field_picture  # noqa: E402
 from unitcad.export.raster import Surface, draw  # noqa: E402
 from unitcad.kernels import mesh  # noqa: E402
 from unitcad.lab.phantom import SEGMENTS, PhantomSet, load_phantom, phantom_set  # noqa: E402
@@ -38,6 +40,7 @@ from unitcad.pipeline.scenes import exploded_view, step_in_section, unit_cut_ope
 from unitcad.pipeline.write import build  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
 from unitcad.shape.tree import Body  # noqa: E402
+from unitcad.skin_map import field_of  # noqa: E402
 from unitcad.validation import compound_kind, load  # noqa: E402
 
 ARRAY_PICTURES = {"skin-side": "patch-skin-side", "tools": "tools"}
@@ -133,6 +136,7 @@ def arrays() -> dict[str, bytes]:
         "array-band-tools.png": band["pictures/tools.png"](),
         "array-curved-tools.png": sleeve["pictures/tools.png"](),
         "array-crosstalk.svg": maps["crosstalk.svg"],
+        "array-skin-map.svg": field_picture(field_of(array_map(array)), "svg"),
     }
 
 

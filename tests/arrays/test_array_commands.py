@@ -68,6 +68,7 @@ def test_build_writes_an_array_and_its_page(tmp_path):
     assert (folder / "bench.html").is_file()
     assert (folder / "units/encapsulating/report.html").is_file()
     assert "1 unit on a sheet" in done.stderr
+    assert "unit encapsulating is 4.6 mm high (drawn 4.61), caps 1.2 and 1.2" in done.stderr
 
 
 def test_step_0_of_an_array_measures_each_unit_s_parts_and_its_command_builds_the_array(tmp_path):

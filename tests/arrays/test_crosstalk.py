@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -21,7 +22,7 @@ from unitcad.arrays.crosstalk import (
     patch_map_svg,
     worst_phases,
 )
-from unitcad.attenuation import UniformDisc
+from unitcad.attenuation import LayeredMedium, UniformDisc
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.estimate_inputs import answer_spec, estimate_input
@@ -52,6 +53,20 @@ def scattered(drive):
     driven = {**UNIT, "motor": {"drive": drive}}
     place = [{"at": at, "unit": {**driven, "like": like}} for at, like in others.items()]
     return array({"kind": "list", "points_mm": points}, unit=driven, place=place, sheet={"thickness_mm": 1.5})
+
+
+def test_a_response_that_misses_its_accuracy_is_told_once(monkeypatch):
+    assert DATA["not_reached"] == []
+    solve = LayeredMedium.response
+
+    def poor(*arguments, **keywords):
+        found = solve(*arguments, **keywords)
+        return replace(found, error_z=found.error_z + 0.05 * found.largest)
+
+    monkeypatch.setattr(LayeredMedium, "response", poor)
+    data = crosstalk(grid(2, 1, 20.0))
+    assert data["not_reached"] == ["the error may be 0.05 of the largest motion, 0.001 was wanted"]
+    assert data["answer"][-1] == f"A response of the skin does not reach its accuracy: {data['not_reached'][0]}."
 
 
 def test_every_pair_is_what_the_solver_gives_it_alone():

@@ -1,7 +1,9 @@
 """The answer: one typed object, its one line, what widens or voids its range, and how two answers are compared."""
 
 import json
+import math
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -12,9 +14,10 @@ import unitcad
 from unitcad.attenuation.edge.answer import WIDEST
 from unitcad.attenuation.edge.scores import scores
 from unitcad.attenuation.edge.scoring import assessments, choice
-from unitcad.attenuation.edge.words import ANY_FORM, NO_EFFECT, compared, details, first_line, lines, percent
+from unitcad.attenuation.edge.words import ANY_FORM, NO_EFFECT, comparison, details, effect, first_line, lines, percent
 from unitcad.cli import app
 from unitcad.designs import design_of
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_spec
 from unitcad.spec import to_toml
 from unitcad.validation import from_data, load, read, templates
@@ -246,6 +249,8 @@ def test_a_custom_design_has_no_level_by_the_same_mechanism(name):
     assert first_line(found).startswith("No level at the edge: the rule knows embedded and encapsulating units only.")
     shown = CliRunner().invoke(app, ["estimate", f"custom/{name}"])
     assert first_line(found) in shown.output
+    assert shown.output.count(found.reason) == 1
+    assert "The paper's analytic model gives no number either." in shown.output
     assert shown.exit_code == 0
     data = estimate_spec(spec)
     json.dumps(data, allow_nan=False)
@@ -278,11 +283,41 @@ def test_two_answers_are_compared_model_against_model():
     base = lead("encapsulating")
     for change in ("layers.0.wall_mm=1.5", "diameter_mm=16", "motor.part=VC0720B001F"):
         other = lead("encapsulating", change)
-        assert compared(other, base).endswith(NO_EFFECT), change
-    assert compared(lead("embedded"), base) == "15 % against 4.6 %: a factor of 3.3"
-    assert compared(lead("encapsulating", "motor.drive=axial"), base) == "not compared: a level is not known"
-    shown = CliRunner().invoke(app, ["estimate", "encapsulating", "embedded"]).output
-    assert "embedded, compared with encapsulating: 15 % against 4.6 %: a factor of 3.3" in shown
+        assert effect(other, base) == NO_EFFECT, change
+    assert effect(lead("embedded"), base) == "a factor of 3.3"
+    assert effect(lead("encapsulating", "motor.drive=axial"), base) == "not compared: a level is not known"
+    bands = comparison([("a", base), ("b", lead("three-layer"))])
+    assert bands[0]["no measured unit had its"] == "-"
+    assert bands[1]["no measured unit had its"] == "silicones, walls, caps and diameter"
+
+
+def test_several_units_are_a_table_and_a_dot_plot(tmp_path):
+    svg = tmp_path / "levels.svg"
+    shown = CliRunner().invoke(app, ["estimate", "encapsulating", "embedded", "--svg", str(svg)]).output
+    cells = [[cell.strip() for cell in line.split("│")[1:-1]] for line in shown.splitlines() if "│" in line]
+    assert cells == [
+        ["encapsulating", "4.6 (3.1 to 6.8)", "5.2", "-"],
+        ["embedded", "15 (10 to 22)", "16", "a factor of 3.3"],
+    ]
+    assert shown.count("fitted to 9 measured units") == 1  # the model once, not a line a unit
+    drawn = ElementTree.fromstring(svg.read_text())
+    place = {name: [one for one in drawn.iter() if one.tag.endswith(name)] for name in ("circle", "polygon", "text")}
+    ticks = {
+        float(one.text): float(one.get("x"))
+        for one in place["text"]
+        if one.text.replace(".", "").isdigit()
+    }  # fmt: skip
+    # The dots, after that of the key, lie where the axis has the answers' levels.
+    low, high = min(ticks), max(ticks)
+    for dot, one in zip(place["circle"][1:], (lead("encapsulating"), lead("embedded")), strict=True):
+        share = math.log(100 * one.level / low) / math.log(high / low)
+        assert float(dot.get("cx")) == pytest.approx(ticks[low] + share * (ticks[high] - ticks[low]), abs=0.1)
+    assert len(place["polygon"]) == 1 + 2
+    again = tmp_path / "again.svg"
+    CliRunner().invoke(app, ["estimate", "encapsulating", "embedded", "--json", "--svg", str(again)])
+    assert again.read_bytes() == svg.read_bytes()
+    refused = CliRunner().invoke(app, ["estimate", "encapsulating", "--svg", str(tmp_path / "a.png")])
+    assert isinstance(refused.exception, Refusal)
 
 
 def test_the_stored_scores_lead_to_the_same_answer_as_scores_made_anew():

@@ -1,10 +1,17 @@
 """Displacements: exact identities and shapes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.edge.estimates import estimate
+from unitcad.attenuation.edge.words import skin_lines
 from unitcad.attenuation.layered import KelvinVoigt, LossFactor, UniformDisc
+from unitcad.estimate_inputs import estimate_input
+from unitcad.validation import load
 
 A, OMEGA = 3.5e-3, 2 * np.pi * 125
 RADII = np.geomspace(1e-4, 50e-3, 13)
@@ -50,3 +57,34 @@ def test_shapes():
     medium, load = forearm(), UniformDisc(A)
     assert np.ndim(medium.response(load, OMEGA, 5e-3).u_z) == 0
     assert medium.response(load, OMEGA, [[1e-3, 2e-3]]).u_r.shape == (1, 2)
+
+
+def test_a_response_that_misses_its_accuracy_says_so():
+    """Without damping rounding leaves 1e-10 of the largest motion, so 1e-12 can't be reached; 1e-6 can."""
+    missed, reached = (forearm(damped=False).response(UniformDisc(A), OMEGA, RADII, rtol) for rtol in (1e-12, 1e-6))
+    assert (missed.rtol, missed.reached) == (1e-12, False)
+    assert missed.error > 1e-12 * missed.largest
+    assert f"may be {missed.error / missed.largest:.2g} of the largest motion, 1e-12 was wanted" in missed.shortfall
+    assert (reached.reached, reached.shortfall) == (True, "")
+
+
+def test_the_estimate_prints_a_missed_accuracy(monkeypatch):
+    variant, solve = estimate_input(load("encapsulating")), LayeredMedium.response
+    fine = layered_block(variant)
+    assert (fine["rtol"], fine["not_reached"]) == (1e-4, [])
+    assert not any("does not reach" in line for line in skin_lines(fine))
+
+    def poor(*arguments, **keywords):
+        found = solve(*arguments, **keywords)
+        return replace(found, error_z=found.error_z + 0.02 * found.largest)
+
+    monkeypatch.setattr(LayeredMedium, "response", poor)
+    block = layered_block(variant)
+    assert block["not_reached"][0].startswith(
+        "flat drive, nominal: the error may be 0.02 of the largest motion, 0.0001"
+    )
+    assert len(block["not_reached"]) == 2 * 9
+    (told,) = (line for line in skin_lines(block) if "does not reach" in line)
+    assert block["not_reached"][0] in told
+    data = estimate(variant, layered=lambda _: block)
+    assert told in data["answer"]["details"]

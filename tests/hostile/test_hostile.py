@@ -275,7 +275,7 @@ def test_a_batch_that_is_taken_up(long, law, folder):
     texts = _some([*inputs.JSON.items(), *inputs.ANY.items()], 1, long)
     for i, (name, text) in enumerate(texts):
         shutil.copytree(folder / "whole", folder / name)
-        put(folder / name, ("journal.jsonl", "batch.json", "batch.lock")[i % 3], text)
+        put(folder / name / "sweep", ("journal.jsonl", "batch.json", "batch.lock")[i % 3], text)
         runs.append([*batch, name])
     for i, path in enumerate(sorted(path for path in (folder / "cache").rglob("*") if path.is_file())[:30]):
         if i % 2:

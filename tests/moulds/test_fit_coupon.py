@@ -20,6 +20,10 @@ GRID = 2 / 1024
 SEGMENTS = 64
 
 
+LEAK = {f"leak-{kind}.stl" for kind in ("base", "cup", "tongue")} | {"leak-coupon.3mf", "leak-coupon.md"}
+LEAK |= {"leak-coupon.png", "readings.toml"}
+
+
 def pieces(name):
     return {body.name: realise(body.shape, SEGMENTS) for body in coupon.Coupon(printers()[name]).bodies()}
 
@@ -86,7 +90,7 @@ def test_command_writes_a_folder(tmp_path):
     assert result.exit_code == 0, result.output
     output = json.loads(result.stdout)
     names = {file.name for file in Path(output["folder"]).iterdir()}
-    assert names == {"coupon-plate.stl", "coupon-plug.stl", "coupon-tongue.stl", "coupon.3mf", "coupon.md"}
+    assert names == {"coupon-plate.stl", "coupon-plug.stl", "coupon-tongue.stl", "coupon.3mf", "coupon.md"} | LEAK
     first = {file.name: file.read_bytes() for file in Path(output["folder"]).iterdir()}
     CliRunner().invoke(app, ["coupon", "fdm-0.4", "-o", str(tmp_path)])
     assert first == {file.name: file.read_bytes() for file in Path(output["folder"]).iterdir()}

@@ -114,6 +114,13 @@ def test_the_terminal_says_the_heights_that_the_printer_makes():
     assert as_printed(casting) == "4.6 mm high (drawn 4.61), caps 1.2 and 1.2"
 
 
+def test_a_curved_array_has_caps_only():
+    cap = {"what": "layer 1's cap", "asked_mm": 1.25, "printed_mm": 1.2}
+    casting = {"unit_heights": [{"what": "cavity", "asked_mm": 2.11, "printed_mm": 2.2}, cap]}
+    assert as_printed({**casting, "printing": {"layer_mm": 0.2}}) == "cap 1.2 mm (drawn 1.25)"
+    assert as_printed({"unit_heights": [], "printing": {"layer_mm": 0.2}}) == ""
+
+
 def test_a_first_layer_of_nothing_is_refused():
     with pytest.raises(UnitcadError, match="first_layer_mm"):
         load("encapsulating", ["moulds.first_layer_mm=0"])

@@ -106,6 +106,22 @@ def test_coupon_needs_no_repair(tmp_path):
         assert not prusa.needs_repair(file)
 
 
+def test_no_setting_of_an_object_carries_the_first_layer(tmp_path):
+    """What docs/how-to/print-and-cast.md says of PrusaSlicer: the plate's layers start where the user's setting does."""
+    moulds = set_of("encapsulating")
+    (plate,) = mould_plates(moulds).values()
+    file, code = tmp_path / "plate.3mf", tmp_path / "plate.gcode"
+
+    def first(settings, *options):
+        file.write_bytes(threemf_content(moulds, plate, settings))
+        prusa.run("--export-gcode", *options, "--output", code, file)
+        return [float(z) for z in re.findall(r"^;Z:([\d.]+)$", code.read_text(), re.M)[:2]]
+
+    ours = slicer_settings(moulds)
+    assert first({**ours, "first_layer_height": "0.2"}) == [0.35, 0.55], "if this is 0.2, write the setting"
+    assert first(ours, "--first-layer-height", "0.2") == [0.2, 0.4]
+
+
 def test_the_plate_s_settings_replace_those_of_the_user(tmp_path):
     """Sliced with other settings of the user, the plate has the layers and filament of the sheet's settings."""
     moulds = set_of("encapsulating")

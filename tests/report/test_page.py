@@ -131,26 +131,28 @@ def test_a_batch_is_listed_as_it_lists_itself(built, tmp_path):
     (tmp_path / "batch.json").write_text(json.dumps({**batch, "variants": variants}), "utf-8")
     data = data_of(write_report(tmp_path).read_text("utf-8"))
     assert data["title"] == "sweep: 3 variants"
-    assert data["table"]["columns"] == ["name", "index", "status", "edge", "flag", "none"]
+    assert data["table"]["columns"] == ["name", "status", "edge", "flag", "none", "index"]
     assert data["table"]["rows"] == [
-        ["good", "good", 0, "ok", 0.5, "true", None],
-        ["", "bad", 1, "failed", None, None, None],
-        ["", "gone", 2, "ok", None, None, None],
+        ["good", "good", "ok", 0.5, "true", None, 0],
+        ["", "bad", "failed", None, None, None, 1],
+        ["", "gone", "ok", None, None, None, 2],
     ]
     assert "variants" not in data["batch"]
 
 
-def test_what_was_swept_and_the_levels_come_first(sweep):
+def test_the_levels_and_what_was_swept_come_first(sweep):
     columns = ["index", "status", "reason", "folder", "motor", "moulds.land_mm", "name", "design", "diameter_mm",
                "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_level", "edge_low"]  # fmt: skip
     batch = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
     assert read_results.results_table(batch, [], {}).columns == [
-        "name", "motor", "moulds.land_mm", "design", "diameter_mm", "edge_level", "edge_low",
-        "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
+        "name", "edge_level", "edge_low", "motor", "moulds.land_mm", "design", "diameter_mm",
+        "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws", "index",
     ]  # fmt: skip
     without = data_of((sweep / "report.html").read_text("utf-8"))["table"]["columns"]
     places = [
-        0 if name in ("name", "design", "diameter_mm") or name.startswith("layers.") else 1 + (name[:5] != "edge_")
+        0
+        if name == "name" or name[:5] == "edge_"
+        else 1 + (name not in ("design", "diameter_mm") and name[:7] != "layers.")
         for name in without
     ]
     assert places == sorted(places)

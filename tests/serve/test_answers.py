@@ -4,15 +4,20 @@ import base64
 import json
 import time
 import tomllib
+from pathlib import Path
 
 import pytest
+from msgspec import structs
 from running import serving
 
 from unitcad.checks import check_moulds
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
-from unitcad.serve.messages import Field
+from unitcad.serve.application import values_of
+from unitcad.serve.messages import Field, Sweep
+from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load, templates
 
@@ -28,7 +33,7 @@ def test_answers_are_those_of_the_commands(server, name):
     judged = server.ask(text, "moulds")
     assert judged["checks"] == json.loads(json.dumps([finding.as_dict() for finding in check_moulds(moulds)]))
     assert base64.b64decode(judged["model"]["moulds"]) == glb_content(moulds, moulds.plan.tools)
-    assert len(judged["lines"]) == 3
+    assert len(judged["lines"]) == 2
     if name == "encapsulating":
         assert server.ask(text, "estimate")["estimate"] == json.loads(json.dumps(estimate_spec(spec)))
 
@@ -96,6 +101,16 @@ def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path):
         assert len(list((tmp_path / "made").glob("single-embedded-*"))) == 1
 
 
+def test_a_sweep_of_silicones_has_two_or_more_and_the_level_reads_it():
+    asked = Sweep(text="", key="layers.0.material", words=["ecoflex-00-10", "dragon-skin-30", "ecoflex-00-10"])
+    assert values_of(asked) == ["ecoflex-00-10", "dragon-skin-30"]
+    with pytest.raises(Refusal, match="two values or more"):
+        values_of(structs.replace(asked, words=["ecoflex-00-10"] * 2))
+    assert values_of(Sweep(text="", key="moulds.vents", low=4, high=8, count=3)) == [4, 6, 8]
+    data = {"base": "encapsulating", "sweep": {asked.key: values_of(asked)}}
+    assert swept_estimate(from_file(data, Path(), "sweep"), 2).unread == []
+
+
 def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path):
     (tmp_path / "out" / "sweep-1").mkdir(parents=True)
     with serving(tmp_path) as own:
@@ -108,10 +123,10 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path):
         assert stages[0] == "0 of 2 variants"
         assert "1 of 2 variants" in stages or "2 of 2 variants" in stages
         assert stages[-1] == "page"
-        assert state["page"].partition("/")[2] == "sweep-2/results/report.html"
+        assert state["page"].partition("/")[2] == "sweep-2/sweep/report.html"
         assert own.send(f"/files/{state['page']}")[0] == 200
     folder = tmp_path / "out" / "sweep-2"
-    assert sorted(path.name for path in folder.iterdir()) == ["results", "spec.toml", "sweep.toml"]
+    assert sorted(path.name for path in folder.iterdir()) == ["spec.toml", "sweep", "sweep.toml"]
     swept = from_file(tomllib.loads((folder / "sweep.toml").read_text()), folder, "sweep")
     assert swept.axes == {"layers.0.wall_mm": [2.0, 3.0]}
     # Defaults follow the key's values: the base is the text itself.

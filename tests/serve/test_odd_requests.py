@@ -91,8 +91,10 @@ def test_odd_edits_are_no_fault_of_the_server(own, kind, step):
 def test_a_batch_that_has_gone_is_told(tmp_path):
     batch = tmp_path / "batch"
     batch.mkdir()
-    (batch / "sweep.toml").write_text('base = "embedded"\n[sweep]\nmode = "product"\ndiameter_mm = [13]\n')
-    done = unitcad("batch", batch / "sweep.toml", "-o", tmp_path / "results", "--only", "estimate", "--report")
+    (batch / "sweep.toml").write_text(
+        'name = "results"\nbase = "embedded"\n[sweep]\nmode = "product"\ndiameter_mm = [13]\n'
+    )
+    done = unitcad("batch", batch / "sweep.toml", "-o", tmp_path, "--only", "estimate", "--report")
     assert done.returncode == 0
     with serving(tmp_path, "results") as one:
         os.rename(tmp_path / "results", tmp_path / "gone")

@@ -69,8 +69,8 @@ def cluster(tmp_path):
 
 
 def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster, tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "slow", materials=3), tmp_path / "out"
-    child = started("batch", sweep, "-o", out, "--scheduler", cluster.address, "--json")
+    sweep, out = ring_sweep(tmp_path / "s", "slow", materials=3), tmp_path / "rings"
+    child = started("batch", sweep, "-o", out.parent, "--scheduler", cluster.address, "--json")
     journal = out / "journal.jsonl"
     until(lambda: journal.exists() and journal.read_bytes().count(b"\n") > 3)  # its head, three done
     cluster.workers[0].kill()
@@ -86,8 +86,8 @@ def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster, tmp_path):
 
 @pytest.mark.long
 def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster, tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "slow", [float(h) for h in range(2, 9)]), tmp_path / "out"
-    words = ("batch", sweep, "-o", out, "--scheduler", cluster.address)
+    sweep, out = ring_sweep(tmp_path / "s", "slow", [float(h) for h in range(2, 9)]), tmp_path / "rings"
+    words = ("batch", sweep, "-o", out.parent, "--scheduler", cluster.address)
     child, journal = started(*words), out / "journal.jsonl"
     until(lambda: journal.exists() and journal.read_bytes().count(b"\n") > 2)  # its head, two done
     child.send_signal(signal.SIGINT)
@@ -187,7 +187,7 @@ def test_a_cluster_behind_certificates_makes_the_same_bytes(encrypted, tmp_path)
     env = {**environment(), **_configured(*_authority("ours"))}
     assert summary_of(sweep, "-o", tmp_path / "a", "--scheduler", encrypted.address, env=env)["ok"] == 4
     made(sweep, tmp_path / "here", cache=tmp_path / "other")
-    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "here")
+    assert bytes_of(tmp_path / "a" / "rings") == bytes_of(tmp_path / "here")
 
 
 @pytest.mark.long
@@ -200,7 +200,7 @@ def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path):
         assert done.returncode == 2, done.stderr
         assert done.stderr.startswith(f"error: --scheduler {encrypted.address}: ")
         assert len(done.stderr.splitlines()) == 1
-        assert not (tmp_path / "o" / "variants.csv").exists()
+        assert not (tmp_path / "o" / "rings" / "variants.csv").exists()
 
 
 @pytest.mark.parametrize(

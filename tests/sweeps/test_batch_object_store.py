@@ -76,7 +76,7 @@ def test_a_bucket_has_the_bytes_of_a_folder_and_another_machine_resumes(bucket, 
     words = (sweep, "-o", "s3://bucket/a/b", "-j", "1")
     assert batch(tmp_path / "one", *words)["ok"] == 4
     made(sweep, tmp_path / "plain")
-    assert stored(bucket / "a/b") == bytes_of(tmp_path / "plain")
+    assert stored(bucket / "a/b/rings") == bytes_of(tmp_path / "plain")
     assert sorted(path.name for path in (tmp_path / "one/out/rings").glob("ring-*")) == []
     other = batch(tmp_path / "two", *words)
     assert (other["ok"], other["taken_up"]) == (4, 4)
@@ -84,7 +84,7 @@ def test_a_bucket_has_the_bytes_of_a_folder_and_another_machine_resumes(bucket, 
 
 def test_a_damaged_or_missing_object_is_made_again(bucket, tmp_path):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0])
-    words = (sweep, "-o", "s3://bucket/rings", "-j", "0")
+    words = (sweep, "-o", "s3://bucket", "-j", "0")
     batch(tmp_path / "one", *words)
     before = stored(bucket / "rings")
     from obstore.store import from_url
@@ -101,7 +101,7 @@ def test_a_damaged_or_missing_object_is_made_again(bucket, tmp_path):
 def test_a_killed_batch_resumes(bucket, tmp_path):
     sweep, here = ring_sweep(tmp_path / "s", "slow", [float(h) for h in range(2, 9)]), tmp_path / "one"
     here.mkdir()
-    words = (sweep, "-o", "s3://bucket/rings", "-j", "1")
+    words = (sweep, "-o", "s3://bucket", "-j", "1")
     child, journal = started("batch", *words, cwd=here), here / "out/rings/journal.jsonl"
     until(lambda: journal.exists() and journal.read_bytes().count(b"\n") > 2)  # its head, two done
     child.send_signal(signal.SIGKILL)
@@ -115,7 +115,7 @@ def test_a_killed_batch_resumes(bucket, tmp_path):
 
 def test_shards_of_machines_without_a_shared_disk_meet_in_the_store(bucket, tmp_path):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2)
-    words = (sweep, "-o", "s3://bucket/rings", "-j", "0")
+    words = (sweep, "-o", "s3://bucket", "-j", "0")
     for number in (1, 2):
         assert batch(tmp_path / str(number), *words, "--shard", f"{number}/2")["ok"] == 2
     assert batch(tmp_path / "merged", *words)["taken_up"] == 4
@@ -132,7 +132,7 @@ def test_a_cluster_without_a_shared_disk(bucket, tmp_path):
     try:
         here = tmp_path / "one"
         here.mkdir()
-        words = ("batch", sweep, "-o", "s3://bucket/rings", "--scheduler", cluster.address, "--json")
+        words = ("batch", sweep, "-o", "s3://bucket", "--scheduler", cluster.address, "--json")
         child, journal = started(*words, cwd=here), here / "out/rings/journal.jsonl"
         until(lambda: journal.exists() and journal.read_bytes().count(b"\n") > 3)
         cluster.workers[0].kill()
@@ -169,7 +169,7 @@ def test_a_server_that_is_gone_is_told_soon(tmp_path, monkeypatch):
     for name, value in {**KEYS, "AWS_ENDPOINT_URL": "http://127.0.0.1:9"}.items():
         monkeypatch.setenv(name, value)
     start = time.monotonic()
-    done = unitcad("batch", ring_sweep(tmp_path / "s"), "-o", "s3://bucket/rings")
+    done = unitcad("batch", ring_sweep(tmp_path / "s"), "-o", "s3://bucket")
     assert done.returncode == 2
     assert time.monotonic() - start < 60
     assert "-o s3://bucket/rings: " in done.stderr

@@ -23,9 +23,9 @@ def test_each_geometry_once_whatever_the_workers(tmp_path):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3)
     outs = []
     for jobs in (0, 2):
-        outs.append(tmp_path / f"out{jobs}")
+        outs.append(tmp_path / f"out{jobs}" / "rings")
         (tmp_path / "s" / "calls").unlink(missing_ok=True)
-        summary = summary_of(sweep, "-o", outs[-1], "-j", jobs, "--cache", tmp_path / f"cache{jobs}")
+        summary = summary_of(sweep, "-o", outs[-1].parent, "-j", jobs, "--cache", tmp_path / f"cache{jobs}")
         assert (summary["ok"], summary["geometries"], summary["reused"]) == (6, 2, 4)
         assert sorted(calls(tmp_path / "s")) == ["2.0", "3.0"]
     assert bytes_of(outs[0]) == bytes_of(outs[1])
@@ -50,7 +50,7 @@ def test_a_variant_is_the_same_as_built_alone_and_its_checks_are_in_the_table(tm
 def test_the_table_has_a_row_a_variant_with_what_was_swept_and_what_came_out(tmp_path):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 4.0], materials=2)
     assert unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0).returncode == 0
-    with open(tmp_path / "o" / "variants.csv", newline="", encoding="utf-8") as file:
+    with open(tmp_path / "o" / "rings" / "variants.csv", newline="", encoding="utf-8") as file:
         table = list(csv.DictReader(file))
     assert [row["index"] for row in table] == ["0", "1", "2", "3"]
     assert [row["parameters.height_mm"] for row in table] == ["2.0", "2.0", "4.0", "4.0"]
@@ -60,8 +60,8 @@ def test_the_table_has_a_row_a_variant_with_what_was_swept_and_what_came_out(tmp
         volume = pi * (7.0**2 - 4.5**2) * float(row["parameters.height_mm"])
         assert float(row["layer1_volume_mm3"]) == pytest.approx(volume, rel=1e-8)
         assert float(row["layer1_mass_g"]) == pytest.approx(volume * density / 1000, rel=1e-5)
-        assert (tmp_path / "o" / row["folder"] / "manifest.json").is_file()
-    listed = json.loads((tmp_path / "o" / "batch.json").read_text())
+        assert (tmp_path / "o" / "rings" / row["folder"] / "manifest.json").is_file()
+    listed = json.loads((tmp_path / "o" / "rings" / "batch.json").read_text())
     assert listed["columns"] == list(table[0])
     assert [row["layer1_mass_g"] for row in listed["variants"]] == [float(row["layer1_mass_g"]) for row in table]
 
@@ -70,7 +70,7 @@ def test_a_formula_stays_text_in_the_table(tmp_path):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0])
     done = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0, "--set", "name='=1+1'")
     assert done.returncode == 0, done.stderr
-    assert ",'=1+1," in (tmp_path / "o" / "variants.csv").read_text()
+    assert ",'=1+1," in (tmp_path / "o" / "rings" / "variants.csv").read_text()
 
 
 def test_the_last_line_s_sums_and_plurals(tmp_path):
@@ -86,20 +86,23 @@ def test_the_last_line_s_sums_and_plurals(tmp_path):
 
 def test_folders_that_are_not_ours(tmp_path):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0])
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "letter").write_text("keep")
-    (tmp_path / "file").write_text("keep")
+    (tmp_path / "mine" / "rings").mkdir(parents=True)
+    (tmp_path / "mine" / "rings" / "letter").write_text("keep")
+    (tmp_path / "file").mkdir()
+    (tmp_path / "file" / "rings").write_text("keep")
     for out, message in (("mine", "no batch's result"), ("file", "is a file")):
         done = unitcad("batch", sweep, "-o", tmp_path / out)
         assert done.returncode == 2
         assert message in done.stderr
-    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["letter"]
+    assert [p.name for p in (tmp_path / "mine" / "rings").iterdir()] == ["letter"]
     assert unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0).returncode == 0
-    other = unitcad("batch", "published", "-o", tmp_path / "o")
+    changed = tmp_path / "published.toml"
+    changed.write_text('base = "embedded"\nname = "rings"\n[sweep]\ndiameter_mm = [14, 15]\n')
+    other = unitcad("batch", changed, "-o", tmp_path / "o")
     assert other.returncode == 2
     assert "has another batch (rings" in other.stderr
     # A variant's place taken by something else: that one fails, nothing is overwritten.
-    folder = next((tmp_path / "o").glob("ring-*"))
+    folder = next((tmp_path / "o" / "rings").glob("ring-*"))
     (folder / "spec.toml").write_text(to_toml(from_data(read("embedded"))))
     (folder / "manifest.json").unlink()
     again = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0)
@@ -121,7 +124,7 @@ def test_progress_is_lines_for_machines_and_nothing_in_a_pipe(tmp_path):
     assert json.loads(unknown.stdout)["error"]["message"].startswith("--slow: unknown option")
     quiet = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 1)
     assert quiet.stderr == ""
-    assert quiet.stdout.splitlines()[-1] == str(tmp_path / "o")
+    assert quiet.stdout.splitlines()[-1] == str(tmp_path / "o" / "rings")
 
 
 def test_the_bar_on_a_terminal_shows_rate_reused_failed(monkeypatch):
@@ -145,14 +148,14 @@ def test_the_bar_on_a_terminal_shows_rate_reused_failed(monkeypatch):
 def test_cache_ls_and_gc(tmp_path, own_cache):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0])
     unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0, env=environment())  # the cache has no user any more
-    before = bytes_of(tmp_path / "o")
+    before = bytes_of(tmp_path / "o" / "rings")
     listed = json.loads(unitcad("cache", "ls", "--json").stdout)
     assert listed["cache"] == str(own_cache)
     assert listed["bytes"] > 0
     gone = json.loads(unitcad("cache", "gc", "--limit", 0, "--json").stdout)
     assert gone["bytes"] == listed["bytes"]
     assert json.loads(unitcad("cache", "ls", "--json").stdout)["bytes"] == 0
-    assert bytes_of(tmp_path / "o") == before
+    assert bytes_of(tmp_path / "o" / "rings") == before
     assert unitcad("cache", "ls", "--cache", tmp_path).returncode == 2
 
 

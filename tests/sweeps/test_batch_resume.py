@@ -22,7 +22,7 @@ def _flipped(file):
 
 @pytest.fixture
 def two(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0]), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0]), tmp_path / "rings"
     assert made(sweep, out).ok == 2
     return sweep, out
 
@@ -38,7 +38,7 @@ def test_a_finished_variant_whose_file_changed_is_made_again(verify, two):
     else:
         file.unlink()
         file.write_bytes(b"")
-    words = ("batch", sweep, "-o", out, "-j", 0, "--json", *["--verify"] * verify)
+    words = ("batch", sweep, "-o", out.parent, "-j", 0, "--json", *["--verify"] * verify)
     for kept in (1, 2):
         assert json.loads(unitcad(*words).stdout)["taken_up"] == kept
         assert bytes_of(out) == before
@@ -67,7 +67,7 @@ def test_the_manifest_lists_every_file(two):
 
 
 def test_contents_are_on_the_disk_before_the_journal_says_so(tmp_path, monkeypatch):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "rings"
     synced = set()
     noted = []
     sync, add = os.fsync, Journal.add
@@ -125,10 +125,10 @@ def test_other_code_starts_anew_and_another_batch_is_refused(tmp_path, monkeypat
 
 
 def test_other_options_are_another_batch(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0]), tmp_path / "o"
-    assert unitcad("batch", sweep, "-o", out, "-j", 0).returncode == 0
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0]), tmp_path / "rings"
+    assert unitcad("batch", sweep, "-o", out.parent, "-j", 0).returncode == 0
     for words in (["--no-check"], ["--formats", "3mf"], ["--only", "unit,moulds"]):
-        done = unitcad("batch", sweep, "-o", out, "-j", 0, *words)
+        done = unitcad("batch", sweep, "-o", out.parent, "-j", 0, *words)
         assert done.returncode == 2
         assert "has another batch" in done.stderr
-    assert unitcad("batch", sweep, "-o", out, "-j", 0, "--keep-going", "--timeout", 9).returncode == 2
+    assert unitcad("batch", sweep, "-o", out.parent, "-j", 0, "--keep-going", "--timeout", 9).returncode == 2

@@ -31,8 +31,8 @@ def _results(out):
 
 
 def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
-    child = started("batch", sweep, "-o", out, "-j", 2, "--json")
+    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "rings"
+    child = started("batch", sweep, "-o", out.parent, "-j", 2, "--json")
     until(lambda: _results(out))
     psutil.Process(child.pid).children()[0].kill()
     output, errors = child.communicate(timeout=240)
@@ -52,8 +52,8 @@ def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path):
     ],
 )
 def test_a_variant_that_can_not_be_made_is_named(function, more, reason, tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", function), tmp_path / "out"
-    done = unitcad("batch", sweep, "-o", out, "-j", 1, "--keep-going", "--json", *more)
+    sweep, out = ring_sweep(tmp_path / "s", function), tmp_path / "rings"
+    done = unitcad("batch", sweep, "-o", out.parent, "-j", 1, "--keep-going", "--json", *more)
     assert done.returncode == 1, done.stderr
     summary = json.loads(done.stdout)
     assert (summary["ok"], summary["failed"], summary["retried"]) == (3, 1, 1)
@@ -66,16 +66,16 @@ def test_a_variant_that_can_not_be_made_is_named(function, more, reason, tmp_pat
 
 
 def test_what_failed_once_is_tried_again(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "fails_once"), tmp_path / "out"
-    assert summary_of(sweep, "-o", out, "-j", 0)["retried"] == 1
+    sweep, out = ring_sweep(tmp_path / "s", "fails_once"), tmp_path / "rings"
+    assert summary_of(sweep, "-o", out.parent, "-j", 0)["retried"] == 1
 
 
 def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
-    child = started("batch", sweep, "-o", out, "-j", 2, start_new_session=True)
+    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "rings"
+    child = started("batch", sweep, "-o", out.parent, "-j", 2, start_new_session=True)
     until(lambda: _results(out))
     workers = psutil.Process(child.pid).children(recursive=True)
-    second = unitcad("batch", sweep, "-o", out)
+    second = unitcad("batch", sweep, "-o", out.parent)
     assert second.returncode == 2
     assert "another batch is running" in second.stderr
     os.killpg(child.pid, signal.SIGINT)  # to the whole group, as a terminal does
@@ -86,12 +86,12 @@ def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path):
     assert "Traceback" not in errors
     assert left(workers) == []
     assert all(whole(folder, hashes=True) for folder in _results(out))
-    assert summary_of(sweep, "-o", out, "-j", 0)["ok"] == 4
+    assert summary_of(sweep, "-o", out.parent, "-j", 0)["ok"] == 4
     assert not leftovers(out)
 
 
 def test_no_space_left_stops_it_and_keeps_what_is_done(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "unit", HEIGHTS), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s", "unit", HEIGHTS), tmp_path / "rings"
     full = _run_with_full_disk(sweep, out, tmp_path)
     assert full.returncode == 1, full.stderr
     assert "no space left" in full.stderr
@@ -99,7 +99,7 @@ def test_no_space_left_stops_it_and_keeps_what_is_done(tmp_path):
     done = _results(out)
     assert len(done) == 2
     assert all(whole(folder, hashes=True) for folder in done)
-    assert summary_of(sweep, "-o", out, "-j", 0)["ok"] == 4
+    assert summary_of(sweep, "-o", out.parent, "-j", 0)["ok"] == 4
     assert not leftovers(out)
 
 
@@ -119,17 +119,17 @@ def _run_with_full_disk(sweep, out, tmp_path):
         "    return plain(path, mode, *more, **named)\n"
         "builtins.open = full\n"
     )
-    return unitcad("batch", sweep, "-o", out, "-j", 1, env={**environment(), "PYTHONPATH": str(site)})
+    return unitcad("batch", sweep, "-o", out.parent, "-j", 1, env={**environment(), "PYTHONPATH": str(site)})
 
 
 def test_a_refused_variant_stops_nothing(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "rings"
     sweep.write_text(
         'base = "./ring.toml"\nname = "rings"\n[sweep]\nmode = "zip"\n'
         '"layers.0.wall_mm" = [0.1, 1.25, 0.2, 1.5]\n"parameters.height_mm" = [2.0, 3.0, 4.0, 5.0]\n'
     )
     for _ in range(2):
-        done = unitcad("batch", sweep, "-o", out, "-j", 0)
+        done = unitcad("batch", sweep, "-o", out.parent, "-j", 0)
         assert done.returncode == 1
         assert "stopped" not in done.stderr
         for index, wall in ((0, "0.1"), (2, "0.2")):
@@ -141,19 +141,19 @@ def test_a_refused_variant_stops_nothing(tmp_path):
 
 
 def test_what_failed_before_is_tried_again_last(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "fails", [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]), tmp_path / "out"
-    assert unitcad("batch", sweep, "-o", out, "-j", 1).returncode == 1
+    sweep, out = ring_sweep(tmp_path / "s", "fails", [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]), tmp_path / "rings"
+    assert unitcad("batch", sweep, "-o", out.parent, "-j", 1).returncode == 1
     assert len(_results(out)) < 5
     assert rows(out)[0]["status"] == "failed"
-    again = unitcad("batch", sweep, "-o", out, "-j", 1)
+    again = unitcad("batch", sweep, "-o", out.parent, "-j", 1)
     assert again.returncode == 1
     assert "stopped: variant 0:" in again.stderr
     assert [row["status"] for row in rows(out)] == ["failed", *["ok"] * 5]
 
 
 def test_a_cache_that_is_deleted_again_and_again_stops_no_batch(tmp_path):
-    sweep, out, cache = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out", tmp_path / "cache"
-    child = started("batch", sweep, "-o", out, "-j", 2, "--cache", cache)
+    sweep, out, cache = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "rings", tmp_path / "cache"
+    child = started("batch", sweep, "-o", out.parent, "-j", 2, "--cache", cache)
     while child.poll() is None:
         shutil.rmtree(cache, ignore_errors=True)
         time.sleep(0.05)
@@ -204,7 +204,7 @@ def test_an_unfinished_check_is_not_stored_and_the_next_build_is_right(monkeypat
 
 def test_a_variant_whose_check_is_unfinished_fails_and_is_made_by_the_next_run(tmp_path):
     """The first run's workers have no time for a check; each variant is tried twice, as after every failure."""
-    sweep, out = tmp_path / "sweep.toml", tmp_path / "out"
+    sweep, out = tmp_path / "sweep.toml", tmp_path / "walls"
     sweep.write_text('base = "single-embedded"\nname = "walls"\n[sweep]\n"layers.0.wall_mm" = [1.5, 2.0]\n')
     hurry = tmp_path / "hurry"
     hurry.mkdir()
@@ -219,7 +219,20 @@ def test_a_variant_whose_check_is_unfinished_fails_and_is_made_by_the_next_run(t
         "check.check_bytes = hurried\n"
     )
     cache = tmp_path / "cache"
-    words = ("batch", sweep, "-o", out, "-j", 1, "--cache", cache, "--formats=stl", "--only", "unit", "--keep-going")
+    words = (
+        "batch",
+        sweep,
+        "-o",
+        tmp_path,
+        "-j",
+        1,
+        "--cache",
+        cache,
+        "--formats=stl",
+        "--only",
+        "unit",
+        "--keep-going",
+    )
     paths = os.pathsep.join([str(hurry), str(Path(__file__).parents[2])])
     first = unitcad(*words, env={**environment(), "PYTHONPATH": paths})
     assert first.returncode == 1, first.stderr

@@ -42,7 +42,7 @@ def test_a_shard_that_is_none(text, nearest):
 
 
 def test_shards_in_any_order_are_the_batch_without_shards(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=5), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=5), tmp_path / "rings"
     for number, finished in ((3, 4), (1, 7), (2, 10)):
         summary = made(sweep, out, shard=Shard(number, 3))
         assert summary.ok == summary.variants == len(Shard(number, 3).indices(10))
@@ -56,7 +56,7 @@ def test_shards_in_any_order_are_the_batch_without_shards(tmp_path):
 
 
 def test_a_batch_makes_the_variants_that_no_shard_has_made(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "fails", materials=2), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s", "fails", materials=2), tmp_path / "rings"
     first = made(sweep, out, shard=Shard(1, 2), keep_going=True)
     assert (first.ok, first.failed) == (2, 2)
     (tmp_path / "s/ring.py").write_text(
@@ -69,8 +69,8 @@ def test_a_batch_makes_the_variants_that_no_shard_has_made(tmp_path):
 
 def test_two_shards_at_once(tmp_path):
     """Processes of their own on one cache: a part that is made twice was in work in both."""
-    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=2), tmp_path / "out"
-    words = (sweep, "-o", out, "-j", 0, "--shard")
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=2), tmp_path / "rings"
+    words = (sweep, "-o", out.parent, "-j", 0, "--shard")
     with ThreadPoolExecutor(2) as pool:
         done = list(pool.map(lambda n: summary_of(*words, f"{n}/2", env=environment()), (1, 2)))
     assert sum(each["ok"] for each in done) == 6
@@ -79,19 +79,19 @@ def test_two_shards_at_once(tmp_path):
 
 
 def test_a_killed_shard_resumes(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s", "slow", [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]), tmp_path / "out"
-    child, journal = started("batch", sweep, "-o", out, "--shard", "1/2", "-j", 0), out / "journal-1-of-2.jsonl"
+    sweep, out = ring_sweep(tmp_path / "s", "slow", [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]), tmp_path / "rings"
+    child, journal = started("batch", sweep, "-o", out.parent, "--shard", "1/2", "-j", 0), out / "journal-1-of-2.jsonl"
     until(lambda: journal.exists() and journal.read_bytes().count(b"\n") > 1)  # its head, one done
     child.send_signal(signal.SIGKILL)
     child.communicate(timeout=30)
-    again = summary_of(sweep, "-o", out, "--shard", "1/2", "-j", 0)
+    again = summary_of(sweep, "-o", out.parent, "--shard", "1/2", "-j", 0)
     assert again["ok"] == 4
     assert again["taken_up"] >= 1
     assert made(sweep, out).resumed == 4
 
 
 def test_a_batch_and_a_shard_keep_each_other_out_but_not_two_shards(tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "rings"
     head = batch_head(load_sweep(sweep), ("unit",), BatchOptions(("unit",)))
     with Journal(out, head, Shard(1, 2)):
         with Journal(out, head, Shard(2, 2)), Journal(out, head, merge=True):
@@ -104,17 +104,17 @@ def test_a_batch_and_a_shard_keep_each_other_out_but_not_two_shards(tmp_path):
 
 
 def test_shards_of_another_batch_are_refused(tmp_path):
-    out = tmp_path / "out"
+    out = tmp_path / "rings"
     made(ring_sweep(tmp_path / "s"), out, shard=Shard(1, 2))
     with pytest.raises(UnitcadError, match="has another batch"):
         made(ring_sweep(tmp_path / "t", heights=[2.0, 6.0]), out, shard=Shard(2, 2))
 
 
 def test_estimates_and_pages_take_shards(tmp_path):
-    words = ("batch", "published", "-o", tmp_path / "out", "--only", "estimate")
+    words = ("batch", "published", "-o", tmp_path, "--only", "estimate")
     for number in (1, 2):
         assert unitcad(*words, "--shard", f"{number}/2").returncode == 0
-    assert unitcad("report", tmp_path / "out").returncode == 0
+    assert unitcad("report", tmp_path / "published").returncode == 0
     unitcad(*words[:3], tmp_path / "plain", *words[4:])
     for table in ("variants.csv", "batch.json"):
-        assert (tmp_path / "out" / table).read_bytes() == (tmp_path / "plain" / table).read_bytes()
+        assert (tmp_path / "published" / table).read_bytes() == (tmp_path / "plain" / "published" / table).read_bytes()

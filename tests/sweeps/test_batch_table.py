@@ -107,14 +107,15 @@ def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path):
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["ok"] == 50
     assert unitcad("batch", "all-materials", "--only", "estimate", "-o", tmp_path / "b").returncode == 0
-    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b")
-    assert not [path for path in (tmp_path / "a").iterdir() if path.is_dir()]
-    with open(tmp_path / "a" / "variants.csv", newline="", encoding="utf-8") as file:
+    assert bytes_of(tmp_path / "a" / "all-materials") == bytes_of(tmp_path / "b" / "all-materials")
+    assert not [path for path in (tmp_path / "a" / "all-materials").iterdir() if path.is_dir()]
+    with open(tmp_path / "a" / "all-materials" / "variants.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 50
     assert sum(bool(row["edge_level"]) for row in rows) == 50
     assert sum(bool(row["edge_measured"]) for row in rows) == 12
-    assert unitcad("batch", "thickness", "--only", "estimate", "-o", tmp_path / "a").returncode == 2
+    again = ("batch", "all-materials", "--only", "estimate", "-o", tmp_path / "a")
+    assert unitcad(*again, "--set", "diameter_mm=15").returncode == 2  # another batch's folder
 
 
 def test_a_table_that_was_interrupted_is_taken_up_where_it_stopped(tmp_path):

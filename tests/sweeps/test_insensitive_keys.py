@@ -72,7 +72,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
         "warning: the level at the edge does not read layers.0.wall_mm and layers.1.wall_mm: at most its range changes"
     )
     assert warning in done.output
-    told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
+    told = json.loads((tmp_path / "b" / "thickness" / "batch.json").read_text())["estimate"]
     assert told == {
         "unread": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "not_measured": {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25},

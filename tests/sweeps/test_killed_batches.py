@@ -38,15 +38,15 @@ def reference(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reference")
     sweep = ring_sweep(folder / "s", heights=HEIGHTS, materials=MATERIALS)
     start = time.monotonic()
-    child = _start(sweep, folder / "out", folder / "cache")
+    child = _start(sweep, folder / "rings", folder / "cache")
     child.communicate(timeout=300)
     assert child.returncode == 0
-    return Reference(sweep, bytes_of(folder / "out"), time.monotonic() - start)
+    return Reference(sweep, bytes_of(folder / "rings"), time.monotonic() - start)
 
 
 def _start(sweep, out, cache):
     # A group of its own, so that a kill can be for the whole of it.
-    return started("batch", sweep, "-o", out, "-j", 2, "--cache", cache, "--json", start_new_session=True)
+    return started("batch", sweep, "-o", out.parent, "-j", 2, "--cache", cache, "--json", start_new_session=True)
 
 
 def _noted(out):
@@ -80,7 +80,7 @@ def _kill(child, dice):
     ("kills", "seed"), [(2, 1), *(pytest.param(5, seed, marks=pytest.mark.long) for seed in range(2, 14))]
 )
 def test_a_batch_that_is_killed_again_and_again(kills, seed, reference, tmp_path):
-    dice, out, cache = random.Random(seed), tmp_path / "out", tmp_path / "cache"
+    dice, out, cache = random.Random(seed), tmp_path / "rings", tmp_path / "cache"
     noted = {}
     before = {}
     while kills:

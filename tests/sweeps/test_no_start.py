@@ -27,8 +27,8 @@ def _limited(which, limit):
     ids=["8 descriptors", "10 descriptors", "24 descriptors", "300 MB", "600 MB"],
 )
 def test_a_batch_with_too_little_to_start_workers_ends_in_one_line(which, limit, tmp_path):
-    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
-    words = command("batch", sweep, "-o", out, "-j", 2, "--cache", tmp_path / "cache")
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "rings"
+    words = command("batch", sweep, "-o", out.parent, "-j", 2, "--cache", tmp_path / "cache")
     done = subprocess.run(
         words, capture_output=True, text=True, timeout=120, env=environment(),
         preexec_fn=lambda: _limited(which, limit),
@@ -39,7 +39,7 @@ def test_a_batch_with_too_little_to_start_workers_ends_in_one_line(which, limit,
     # CPython itself aborts if it finds no memory for the MemoryError.
     if done.returncode and errors != 1 and "Cannot recover from MemoryErrors" not in done.stderr:
         assert " failed" in done.stdout, (done.returncode, done.stdout, done.stderr)  # one worker started, one did not
-    assert summary_of(sweep, "-o", out, "-j", 0, "--cache", tmp_path / "cache")["ok"] == 4
+    assert summary_of(sweep, "-o", out.parent, "-j", 0, "--cache", tmp_path / "cache")["ok"] == 4
 
 
 def test_a_batch_whose_workers_cannot_start_says_so_once(tmp_path):

@@ -39,7 +39,7 @@ _MESHES = {
 }
 _RESPONSE = {"rtol": "rtol", "error": "error", "bound": "bound", "over_bound": "of bound", "wavenumbers": "k", "s": "s"}
 _EXTREMES = {"what": "", "value": "value", "at": "at", "limit": "limit", "extreme": ""}
-_REQUESTS = {"request": "request", "s": "s", "saved_s": "saved", "skipped": "skipped"}
+_REQUESTS = {"request": "request", "s": "s", "quartiles": "quartiles", "saved_s": "saved", "skipped": "skipped"}
 _MEDIA_HEADS = {
     "responses": "responses",
     "within_rtol": "within rtol",
@@ -136,8 +136,15 @@ def _print_spec(data: dict[str, Any]) -> None:
         rows = [{**row, "extreme": "extreme" if row["extreme"] else ""} for row in data["extremes"]]
         _table("Stiff or extreme", _EXTREMES, rows)
         _print_amplification(data["amplification"]["results"])
-    rows = [{**row, "skipped": ", ".join(one["output"] for one in row["skipped"])} for row in data["skipped"]]
-    _table("Time saved by requests for fewer outputs", _REQUESTS, rows)
+    rows = [
+        {
+            **row,
+            "quartiles": f"{_shown(row['s_low'])} to {_shown(row['s_high'])}",
+            "skipped": ", ".join(one["output"] for one in row["skipped"]),
+        }
+        for row in data["skipped"]
+    ]
+    _table("Time saved by requests for fewer outputs; - if the quartiles overlap", _REQUESTS, rows)
 
 
 def _print_amplification(results: Sequence[dict[str, Any]]) -> None:

@@ -40,7 +40,7 @@ from unitcad.spec.toml import text_of
 from unitcad.text import join_words
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.load import named_file, override, shipped_files
-from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of, plain, put
+from unitcad.validation.plain_data import ABSENT, RIVALS, Changes, at, changes_of, plain, put
 from unitcad.validation.suggestions import Judge, every_fault, numbers, suggest_value
 
 
@@ -99,7 +99,9 @@ def unit_data(given: Any, field: str, folder: Path) -> Any:
         if not path.is_file():
             raise Refusal(at_field, given["like"], f"there is no file {path}")
     base = with_source(read_toml(path), path.parent)
-    return merge_tables(base, with_source(own, folder))
+    displaced = [rival for table, rival in RIVALS.items() if isinstance(own.get(table), dict)]
+    kept = {key: value for key, value in base.items() if key not in displaced}
+    return merge_tables(kept, with_source(own, folder))
 
 
 def merge_tables(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

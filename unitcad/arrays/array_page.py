@@ -16,6 +16,7 @@ from manifold3d import Manifold
 from unitcad import files
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of
+from unitcad.arrays.array_map import array_map
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds, PatchPart, patch_bodies, patch_moulds, patch_parts
 from unitcad.casting.steps import duration
@@ -29,10 +30,11 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan, Step
 from unitcad.pipeline.manifest import BENCH, PAGE, Manifest
 from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
-from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_page
+from unitcad.report.html_page import MAP, VIEW, compress, drawing, picture, plain_page
 from unitcad.report.read_results import expect, read_sound, read_table
 from unitcad.shape import union
 from unitcad.shape.tree import Body
+from unitcad.skin_map import map_data
 from unitcad.text import number
 
 BELOW = 14.0
@@ -142,13 +144,16 @@ def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
 
 
 def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
-    array, model, drawn = manifest["array"], _model(folder, warn), [Path(path).name for path in manifest["pictures"]]
+    array, drawn = manifest["array"], [Path(path).name for path in manifest["pictures"]]
 
     def say(fault: str) -> None:
         warn(f"warning: {fault}")
 
     def table(name: str) -> dict[str, Any]:
         return read_sound(folder / name, read_table, say) or {}
+
+    crosstalk = table("crosstalk.json")
+    model = _model(folder, bool(crosstalk), warn)
 
     def figures(*paths: str) -> list[str]:
         return [_figure(folder / path, say) for path in paths]
@@ -162,7 +167,8 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         *_section("3D", [VIEW if model else ""]),
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*figures(*(f"pictures/patch-{side}.png" for side in SIDES)), _worn(array)]),
-        *_section("Crosstalk", [_answer(table("crosstalk.json")), *figures("crosstalk-patch.svg", "crosstalk.svg")]),
+        *_section("Crosstalk", [_answer(crosstalk), *figures("crosstalk-patch.svg", "crosstalk.svg")]),
+        *_section("Motion of the skin", [MAP if model and "skin_map" in model else ""]),
         *_section("Tools", figures(*(f"pictures/{name}" for name in drawn if not name.startswith("patch-")))),
         *_section("Circuit", figures("circuit.svg")),
         *_section("Casting", list(_casting(folder, table("casting.json")))),
@@ -174,14 +180,22 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
     return plain_page(manifest["name"], "\n".join(parts), model)
 
 
-def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
-    """Return what the 3D view shows; None, and a warning, if it can't be made, as of a unit that runs code."""
+def _model(folder: Path, mapped: bool, warn: Callable[[str], None]) -> dict[str, Any] | None:
+    """Return what the 3D view shows, and the map of the skin's motion if it is `mapped`.
+
+    None, and a warning, if it can't be made, as of a unit that runs code.
+    """
     try:
         array = array_of(read_toml(folder / ARRAY_FILE, links=False))
         model = {**patch_model(array), **tools_model(array)}
     except UnitcadError as error:
         warn(f"warning: no 3D view: {error}")
         return None
+    if mapped:
+        try:
+            model["skin_map"] = map_data(array_map(array))
+        except UnitcadError as error:
+            warn(f"warning: no map of the skin's motion: {error}")
     return model | {key: compress(model[key]) for key in ("unit", "moulds")}
 
 
@@ -233,7 +247,7 @@ def _chips(manifest: ArrayManifest) -> str:
     findings, check = manifest["mould_checks"], manifest["check"]
     passed = sum(each["ok"] for each in findings)
     good = passed == len(findings) and not check["errors"]
-    chips = [f"{passed} of {len(findings)} mould checks passed"] if findings else ["not checked"]
+    chips = [f"checks: {passed} of {len(findings)}"] if findings else ["checks: not run"]
     chips.append(f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files")
     marked = "".join(f'<li class="chip {"good" if good else "bad"}">{escape(text)}</li>' for text in chips)
     return f'<ul class="chips">{marked}</ul>'

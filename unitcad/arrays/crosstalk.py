@@ -17,8 +17,7 @@ import numpy as np
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit import circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
-from unitcad.attenuation.curve import RANGE, contact, decay, ends, motion
-from unitcad.attenuation.inputs import Drive
+from unitcad.attenuation.curve import RANGE, contact, decay, ends, in_axes, motion
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.export.chart import coord
@@ -70,8 +69,8 @@ class Decays:
     """An array's units, the inputs of each distinct one's estimate, and the motions that they give each other.
 
     `kind`: the number of each place's distinct unit; `centre`, `edge`: see `distances`; `synchronous`: whether all
-    motors run at one frequency, so that phases mean anything. Raises Refusal for a unit without an estimate, and for
-    units on several tissues.
+    motors run at one frequency, so that phases mean anything; `short`: shortfalls of the responses so far, each once.
+    Raises Refusal for a unit without an estimate, and for units on several tissues.
     """
 
     def __init__(self, array: Array) -> None:
@@ -82,6 +81,7 @@ class Decays:
                 raise Refusal("estimate.tissue", one.tissue_name, f"units side by side are on one tissue, {name}", name)
         self.kind = np.array([array.units.index(place.unit) for place in array.places])
         self.centre, self.edge = distances(array)
+        self.short: dict[str, None] = {}
         self.synchronous = len({one.frequency.middle for one in self.inputs}) == 1
 
     def motions(self, drivers: np.ndarray, ways: np.ndarray, end: dict[str, int] | None = None) -> np.ndarray:
@@ -94,8 +94,11 @@ class Decays:
         for kind, one in enumerate(self.inputs):
             rows = self.kind[drivers] == kind
             if np.any(rows):
-                found[rows] = in_axes(motion(one, 1e-3 * away[rows], end=end), angle[rows], one.drive)
+                found[rows] = in_axes(motion(one, 1e-3 * away[rows], end=end, short=self._note), angle[rows], one.drive)
         return found
+
+    def _note(self, shortfall: str) -> None:
+        self.short[shortfall] = None
 
     def both(self) -> np.ndarray:
         """Return |u| at the centre and at the nearest edge, shape (n, n, 2), rows the unit that drives.
@@ -109,7 +112,7 @@ class Decays:
             rows = self.kind[drivers] == kind
             i, j = drivers[rows], moved[rows]
             if i.size:
-                found[i, j] = decay(one, 1e-3 * away[i, j])
+                found[i, j] = decay(one, 1e-3 * away[i, j], short=self._note)
         return found
 
     def sums(self, worst: int | None = None, end: dict[str, int] | None = None) -> dict[str, np.ndarray]:
@@ -147,22 +150,10 @@ class Decays:
             return dict.fromkeys(("nearest_centre", "nearest_edge"), np.zeros(3))
         one = self.inputs[self.kind[pair[0]]]
         away = np.array([self.centre[pair], self.edge[pair]])
-        found = decay(one, 1e-3 * away, end=end)
+        found = decay(one, 1e-3 * away, end=end, short=self._note)
         low, high = contact(one.drive, away - 500.0 * one.diameter)
         rows = np.stack([found, found * low, found * high], axis=-1)
         return {"nearest_centre": rows[0], "nearest_edge": rows[1]}
-
-
-def in_axes(found: np.ndarray, angle: np.ndarray, drive: Drive) -> np.ndarray:
-    """Return u_r, u_theta and u_z (3, k) at angles (rad, (k,)) as the motion in x, y and z, shape (k, 3).
-
-    A flat motor's force turns: its phase is that of the angle, and u_theta is a quarter turn ahead.
-    """
-    out, around, up = found
-    if drive == "flat":
-        out, around, up = np.exp(-1j * angle) * np.array([out, 1j * around, up])
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.stack([out * cos - around * sin, out * sin + around * cos, up], axis=-1)
 
 
 _STARTS, _TURNS = 8, 40
@@ -191,7 +182,8 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
     """Return an array's crosstalk as JSON-ready data.
 
     `matrix`: the decay between each two units, rows the unit that drives, to the other's centre, null for itself, by
-    its own drive and frequency; `sums`: the sum at each place; `absolute`: a range in the motor's own amplitude.
+    its own drive and frequency; `sums`: the sum at each place; `absolute`: a range in the motor's own amplitude;
+    `not_reached`: the shortfalls of responses that miss their accuracy.
 
     Raises Refusal for a unit without an estimate, and for a frequency out of range.
     """
@@ -237,6 +229,7 @@ def crosstalk(array: Array, say: Callable[[str], None] = lambda line: None) -> d
         ],
         "assumptions": ASSUMPTIONS,
         "absolute": _absolute(units, worst, ranged),
+        "not_reached": [*units.short],
     }
     return {**data, "answer": crosstalk_lines(data)}
 
@@ -330,6 +323,7 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
         f"unit's edge level if the motors are not synchronous (root of squares){_phases(worst)}.",
         _absolute_line(worst["place"], data["absolute"]),
         IN_BRACKETS,
+        *(f"A response of the skin does not reach its accuracy: {short}." for short in data["not_reached"]),
     ]
 
 

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_map import array_map
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.output import print_indented, print_json, progress
@@ -19,25 +20,30 @@ from unitcad.documents import read_json
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.summary import assumed_line, checks_line, to_open
+from unitcad.pipeline.summary import as_printed, assumed_line, checks_text, to_open
+from unitcad.report.map_file import MapFile
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
 
 def array_summary(array: Array, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
-    """Yield a line each: units and size, lengths to measure, casting, checks, crosstalk, the page; `given`: as for
+    """Yield a line each: units, size and checks, lengths to measure, casting, crosstalk, the page; `given`: as for
     a unit's summary.
     """
     box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
-    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
+    made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
+    thick = f"{number(array.sheet.thickness_mm, 3)} mm thick{f', {made}' if made else ''}"
+    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {thick}{checks_text(manifest)}"
+    for own in sorted(folder.glob("units/*/casting.json")) if manifest["casting"] else ():
+        if made := as_printed(read_json(own)):
+            yield f"unit {own.parent.name} is {made}"
     for unit in array.units:
         yield from assumed_line(unit, given, array.paths_of(unit)[0])
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = casting_summary(read_json(folder / "casting.json"))
         yield from (line for line in lines if line not in told)
-    yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from read_json(crosstalk)["answer"][:2]
@@ -49,9 +55,14 @@ _MOST_PLACES, _MOST_PAIRS = 64, 16
 
 
 def estimate_arrays(
-    names: Sequence[str], sets: Sequence[str], hertz: float | None, details: bool, as_json: bool
+    names: Sequence[str],
+    sets: Sequence[str],
+    hertz: float | None,
+    details: bool,
+    as_json: bool,
+    wanted_map: MapFile | None = None,
 ) -> None:
-    """Print the crosstalk of arrays and, of several, each over the first."""
+    """Print the crosstalk of arrays and, of several, each over the first; write the map of one if it is wanted."""
     for name in names:
         if not compound_kind(name):
             raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
@@ -59,6 +70,10 @@ def estimate_arrays(
     arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]
     with progress("crosstalk") as stage:
         every = [crosstalk(array, stage) for array in arrays]
+        if wanted_map:
+            stage("map")
+            drawn = wanted_map.write(array_map(arrays[0], wanted_map.threshold_um, wanted_map.share))
+            every[0]["map"] = drawn.figures()
     compared = ratios(every)
     if as_json:
         print_json(every[0] if len(every) == 1 else {"arrays": every, "ratios": compared})
@@ -72,6 +87,8 @@ def estimate_arrays(
         rest = f": {counted(len(places), 'unit')} ({units}), {frequency}, {drives} drive, {data['tissue']}"
         screen.print(Text.assemble((data["array"], "bold"), rest))
         print_indented(*data["answer"])
+        if wanted_map:
+            print_indented(*data["map"]["lines"], f"Map: {wanted_map.path}")
         if details:
             _print_details(data)
     for one in compared:

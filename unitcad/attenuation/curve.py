@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
-from unitcad.attenuation.layered import LayeredMedium, Response, components
+from unitcad.attenuation.layered import LayeredMedium, Response, Told, components, unheard
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.lean_scipy import special
 
@@ -91,6 +91,7 @@ def decay(
     drive: Drive | None = None,
     hertz: float | None = None,
     end: Mapping[str, int] | None = None,
+    short: Told = unheard,
 ) -> np.ndarray:
     """Return the bare skin's |u| (`U_DEFINITION`) at `radii` (m, any shape) from a unit's middle, over that at its edge.
 
@@ -98,25 +99,41 @@ def decay(
     """
     if hertz is not None:
         variant = replace(variant, frequency=Quantity(hertz))
-    return np.linalg.norm(motion(variant, radii, drive, end), axis=0)
+    return np.linalg.norm(motion(variant, radii, drive, end, short), axis=0)
 
 
 def motion(
-    variant: EstimateInput, radii: np.ndarray, drive: Drive | None = None, end: Mapping[str, int] | None = None
+    variant: EstimateInput,
+    radii: np.ndarray,
+    drive: Drive | None = None,
+    end: Mapping[str, int] | None = None,
+    short: Told = unheard,
 ) -> np.ndarray:
     """Return the bare skin's u_r, u_theta and u_z (complex) over |u| at the unit's edge, shape (3, *radii.shape).
 
     `radii`: m, any shape, inside the edge too. `end`: as in `inputs.tissue_medium`, or "frequency". One response serves
-    all radii. A flat motor's force turns: its point at theta moves by e^(-i theta) (u_r, i u_theta, u_z). Raises
-    `Refusal` for values that no tissue has.
+    all radii. A flat motor's force turns: its point at theta moves by e^(-i theta) (u_r, i u_theta, u_z). `short`
+    gets the shortfall of a response. Raises `Refusal` for values that no tissue has.
     """
     wanted = np.asarray(radii, dtype=float)
-    medium, load, omega = _case(variant, drive or variant.drive, end or {})
-    found = components(medium, load, omega, np.append(wanted.ravel(), variant.diameter / 2.0), _RTOL)
+    medium, load, omega = case(variant, drive or variant.drive, end or {})
+    found = components(medium, load, omega, np.append(wanted.ravel(), variant.diameter / 2.0), _RTOL, short)
     return (found[:, :-1] / np.linalg.norm(found[:, -1])).reshape(3, *wanted.shape)
 
 
-def _case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:
+def in_axes(found: np.ndarray, angle: np.ndarray, drive: Drive) -> np.ndarray:
+    """Return u_r, u_theta and u_z (3, k) at angles (rad, (k,)) as the motion in x, y and z, shape (k, 3).
+
+    A flat motor's force turns: its phase is that of the angle, and u_theta is a quarter turn ahead.
+    """
+    out, around, up = found
+    if drive == "flat":
+        out, around, up = np.exp(-1j * angle) * np.array([out, 1j * around, up])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([out * cos - around * sin, out * sin + around * cos, up], axis=-1)
+
+
+def case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:
     """Return the medium, the load and omega of a drive; `end` as `decay` takes it."""
     frequency = variant.frequency
     hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
@@ -128,12 +145,13 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     """Return the estimate's `layered`: the skin's motion under either drive, over that at the edge, with its spread.
 
     `drives`: the motor's own first, each over |u| at the edge under the same force. `flat_over_axial_per_newton`: |u|
-    by one newton that turns, over |u| by one newton of axial amplitude. The spread takes each kind of input (moduli,
+    by one newton that turns, over |u| by one newton of axial amplitude. `not_reached`: the responses that miss `rtol`,
+    with the error that each reached. The spread takes each kind of input (moduli,
     damping, thicknesses, frequency) by itself to its low and high end; that of |u| has `CONTACT` in it.
     """
 
     def response(drive: Drive, end: Mapping[str, int]) -> Response:
-        medium, load, omega = _case(variant, drive, end)
+        medium, load, omega = case(variant, drive, end)
         return medium.response(load, omega, r, rtol=rtol)
 
     r_mm = np.arange(EDGE_TO_MM + 1)
@@ -142,12 +160,21 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     cases = [{}, *ends(variant)]
     found = {drive: [response(drive, end) for end in cases] for drive in order}
     ratio = [_size(flat) / _size(normal) for flat, normal in zip(found["flat"], found["axial"], strict=True)]
+    names = ["nominal", *(f"{kind} at the {('low', 'high')[at]} end" for end in cases for kind, at in end.items())]
+    short = [
+        f"{drive} drive, {name}: {one.shortfall}"
+        for drive in order
+        for name, one in zip(names, found[drive], strict=True)
+        if not one.reached
+    ]
     return {
         "tissue": variant.tissue_name,
         "frequency_hz": variant.frequency.middle,
         "drive": variant.drive,
         "r_mm": [float(v) for v in r_mm],
         "u_definition": U_DEFINITION,
+        "rtol": rtol,
+        "not_reached": short,
         "drives": {drive: _drive_block(variant, drive, found[drive]) for drive in order},
         "flat_over_axial_per_newton": _curve(ratio),
         "spread": "each kind of input (moduli, damping, thicknesses, frequency) by itself at both ends of its range; "

@@ -7,21 +7,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from unitcad.casting.figures import (
-    BAKE_H,
     FDM_ERROR,
-    MIXING_MIN,
-    WEIGH_MIN,
-    cure_hours,
-    in_room,
     print_min,
 )
 from unitcad.casting.plates import made_pieces, mould_plates
+from unitcad.casting.resin import clean_resin, in_resin, plate_sentences
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import picture_path
-from unitcad.catalogue import Material, inhibitors
+from unitcad.catalogue import Material, Printer, inhibitors
 from unitcad.designs.limits import leaf_mm
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH
-from unitcad.moulds.cup import ribs, window_section
+from unitcad.moulds.cup import ribs
 from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
@@ -35,6 +31,7 @@ INFILL_PERCENT = 20
 SPARE = 2.0
 """Extra length of a piece of filament over its way through base and core, mm."""
 FOOT_MM = 0.2
+"""Elephant foot compensation of a printer whose entry has none, mm."""
 MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
 GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
@@ -42,13 +39,14 @@ GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
 
 
 def slicer_settings(moulds: MouldSet) -> dict[str, str]:
-    """Return the settings of the sheet for each piece, by PrusaSlicer's names; none for a printer of resin."""
+    """Return the settings of the sheet for each piece, by PrusaSlicer's names, of filament or of resin."""
+    layer = f"{moulds.spec.moulds.layer_mm:g}"
     if in_resin(moulds):
-        return {}
+        return {"layer_height": layer, "pad_enable": "0", "supports_enable": "0"}
     return {
-        "elefant_foot_compensation": f"{FOOT_MM if _has_foot(moulds) else 0:g}",
+        "elefant_foot_compensation": f"{foot_mm(printer_of(moulds.spec)) if _has_foot(moulds) else 0:g}",
         "fill_density": f"{INFILL_PERCENT}%",
-        "layer_height": f"{moulds.spec.moulds.layer_mm:g}",
+        "layer_height": layer,
         "perimeters": str(PERIMETERS),
         "support_material": "0",
     }
@@ -57,6 +55,8 @@ def slicer_settings(moulds: MouldSet) -> dict[str, str]:
 def print_description(moulds: MouldSet) -> str:
     """Return the settings of the plates in words, the first layer's height among them, which no setting carries."""
     said = [in_layers(moulds.spec.moulds)]
+    if in_resin(moulds):
+        return f"Print in this attitude: {said[0]}; flat on the plate, no supports, no pad; casting.md has the wells"
     said += [f"{key.replace('_', ' ')} {value}" for key, value in slicer_settings(moulds).items() if "layer" not in key]
     return f"Print in this attitude: {'; '.join(said)}"
 
@@ -64,6 +64,11 @@ def print_description(moulds: MouldSet) -> str:
 def in_layers(lengths: MouldsTable) -> str:
     """Write the layers of the printer."""
     return f"layers {number(lengths.layer_mm, 3)}, first layer {number(lengths.first_layer_mm, 3)} mm"
+
+
+def foot_mm(printer: Printer) -> float:
+    """Return the elephant foot compensation of a printer, mm."""
+    return FOOT_MM if printer.elephant_foot_mm is None else float(printer.elephant_foot_mm)
 
 
 def _has_foot(moulds: MouldSet) -> bool:
@@ -128,11 +133,11 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     layers = f"Printer {lengths.printer}, {in_layers(lengths)}"
     if resin:
         how.append(
-            f"{takes} resin. {layers}; flat on the plate. Compensate the first layers' growth (bottom "
-            "tolerance): it narrows a bore."
+            f"{takes} resin. {layers}. Compensate the first layers' growth (bottom tolerance): it narrows a bore."
         )
+        how += plate_sentences(moulds)
     else:
-        foot = f", elephant foot compensation {number(FOOT_MM, 3)} mm" if _has_foot(moulds) else ""
+        foot = f", elephant foot compensation {number(foot_mm(printer_of(spec)), 3)} mm" if _has_foot(moulds) else ""
         low, high = (number(error, 2) for error in FDM_ERROR)
         how.append(f"{takes} filament (a slicer says {low} to {high} times that).")
         how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
@@ -291,49 +296,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
             required_tools=("hand brush", "sharp knife"),
         )
         return
-    yield BenchStep(
-        "Wash",
-        "Wash the pieces in isopropanol, holes too, until nothing feels slippery. Dry them until no spot is dark."
-        f"{kept_away(silicones)}",
-        kind="rest",
-        minutes=15.0,
-        wait_min=30.0,
-        required_tools=("isopropanol and lint-free wipes",),
-    )
-    exit = moulds.plan.dimensions.exit
-    if exit and (steps := [step for step in moulds.plan.steps if moulds.plan.standing(step, "tongue")]):
-        windows = [window_section(moulds.spec, exit, step.rim) for step in steps]
-        height = number(min(high - low for _, low, high in windows), 2)
-        yield BenchStep(
-            "Clear the windows",
-            f"Clear the windows of {join_words(spaced(step.cup) for step in steps)}, {height} mm high, of resin: rinse "
-            "each with a syringe of isopropanol and push the tongue through until it slides freely.",
-            picture_path("pieces"),
-            minutes=5.0 * len(steps),
-            required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
-        )
-    yield BenchStep(
-        "Post-cure, bake",
-        "Resin keeps many platinum silicones from curing: post-cure, bake at 60 degC for "
-        f"{number(BAKE_H, 2)} h (assumed).",
-        kind="cure",
-        minutes=10.0,
-        wait_min=60 * BAKE_H,
-        required_tools=("oven", "curing lamp"),
-    )
-    room = moulds.spec.casting.room_c
-    drops = {each.name: cure_hours(each, room) for each in silicones}
-    each = ", ".join(f"{name} {in_room(hours, 'h', room)}" for name, hours in drops.items())
-    yield BenchStep(
-        "Test the cure",
-        "Cure a drop of each silicone on the base, off the cavity, for its whole cure "
-        f"({each}). If its underside is tacky, coat the pieces with acrylic varnish (assumed) or "
-        "change the resin; test again.",
-        kind="cure",
-        minutes=WEIGH_MIN + MIXING_MIN,
-        wait_min=60 * max(drops.values()),
-        required_tools=("acrylic varnish",),
-    )
+    yield from clean_resin(moulds, silicones, kept_away(silicones))
 
 
 def fall(moulds: MouldSet) -> tuple[str, str]:
@@ -347,11 +310,6 @@ def fall(moulds: MouldSet) -> tuple[str, str]:
         f"{number(left[name], 1)} mm across the {what} of {number(wide, 3)} mm."
     )
     return said, tool
-
-
-def in_resin(moulds: MouldSet) -> bool:
-    """Tell whether the tools are printed in resin."""
-    return printer_of(moulds.spec).technology.value == "sla"
 
 
 def joining(moulds: MouldSet) -> Iterator[BenchStep]:

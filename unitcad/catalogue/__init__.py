@@ -37,6 +37,7 @@ from unitcad.catalogue.entries import (
     PrinterEntry,
     Tissue,
     TissueEntry,
+    Touch,
     Value,
     kinds_of,
     required_of,
@@ -47,6 +48,7 @@ from unitcad.text import measured, some
 
 __all__ = [
     "FREQUENCIES_HZ",
+    "RESIN",
     "Contact",
     "Material",
     "MaterialEntry",
@@ -57,6 +59,7 @@ __all__ = [
     "PrinterEntry",
     "Tissue",
     "TissueEntry",
+    "Touch",
     "Value",
     "choose",
     "contact",
@@ -67,8 +70,10 @@ __all__ = [
     "motors",
     "needed",
     "printers",
+    "surface_contact",
     "tissue",
     "tissues",
+    "touch",
 ]
 
 _Entry = TypeVar("_Entry", Material, Motor, Printer)
@@ -219,6 +224,20 @@ def tissues() -> Mapping[str, tuple[Tissue, ...]]:
 
 
 @cache
+def touch() -> Mapping[str, Touch]:
+    """Return the thresholds of touch by the name of the tissue.
+
+    Examples
+    --------
+    >>> from unitcad import catalogue
+    >>> forearm = catalogue.touch()["forearm"]
+    >>> forearm.site.value, [round(um, 2) for um in forearm.at(220)], forearm.threshold_um.status
+    ('volar forearm, hairy skin', [1.0, 0.3, 3.0], 'assumed')
+    """
+    return {name: _entry(Touch, name, table, f"touch.{name}") for name, table in _raw("touch.toml").items()}
+
+
+@cache
 def measurements() -> Measurements:
     """Return the paper's measured amplitudes at the edge, as printed."""
     return msgspec.convert(_raw("measurements.toml"), Measurements)
@@ -284,10 +303,27 @@ def contact(poured: Material, on: Material) -> Contact | None:
     return next((one for one in contacts() if (one.poured, one.on) == pair), None)
 
 
+RESIN = "printed resin"
+"""The surface of tools from a printer of resin: a printer's choice, so no item to keep away."""
+
+
+def surface_contact(poured: Material, surface: str) -> Contact | None:
+    """Return what a fresh silicone does on a surface that is no silicone; None if no source says.
+
+    Examples
+    --------
+    >>> from unitcad import catalogue
+    >>> catalogue.surface_contact(catalogue.materials()["ecoflex-00-30"], catalogue.RESIN).result
+    'inhibited'
+    """
+    chemistry = poured.chemistry and poured.chemistry.value
+    return next((one for one in contacts() if (one.poured, one.on) == (chemistry, surface)), None)
+
+
 def inhibitors(silicones: Iterable[Material]) -> tuple[str, ...]:
     """Return the surfaces, other than silicones, on which one of these silicones does not cure."""
     chemistries = {each.chemistry.value for each in silicones if each.chemistry}
-    found = [one for one in contacts() if one.result == "inhibited" and one.on not in CHEMISTRIES]
+    found = [one for one in contacts() if one.result == "inhibited" and one.on not in (*CHEMISTRIES, RESIN)]
     return tuple(dict.fromkeys(one.on for one in found if one.poured in chemistries))
 
 

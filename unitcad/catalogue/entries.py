@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import typing
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, TypeVar
@@ -52,6 +53,9 @@ SlotClearance = Annotated[float, between(0.01, 20, "extra width of the slot, ove
 BoreCompensation = Annotated[
     float,
     between(0, 0.5, "by how much bores are printed too narrow, per side; files make up for it"),
+]
+ElephantFoot = Annotated[
+    float, between(0, 1, "elephant foot compensation of the slicer, by which the first layer is drawn in, per side")
 ]
 WindowClearance = Annotated[float, between(0.01, 5, "gap between the tongue and a cup's window, per side")]
 Wall = Annotated[float, between(0.05, 50, "thinnest wall that prints whole")]
@@ -224,6 +228,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     first_layer_mm: Value[FirstLayer] | None = None
     rib_interference_mm: Value[RibInterference] | None = None
     bore_compensation_mm: Value[BoreCompensation] | None = None
+    elephant_foot_mm: Value[ElephantFoot] | None = None
     support: (
         Value[
             Annotated[Literal["printed", "none"], Meta(description="printed: under overhangs; none: an overhang fails")]
@@ -247,6 +252,38 @@ class Tissue(Struct, frozen=True, kw_only=True):
     viscosity_pa_s: (
         Value[Annotated[float, between(0, 1e6, "viscosity in shear; it overrides the loss factor")]] | None
     ) = None
+
+
+Hertz = Annotated[float, Meta(gt=0)]
+
+
+class Touch(Struct, frozen=True, kw_only=True):
+    """The threshold of touch on a tissue: the least peak displacement of vibration that is felt, over frequency.
+
+    `threshold_um` at `corner_hz`, with a contactor of `contactor_cm2`. Below the corner it falls with frequency, above
+    it rises. The curve is known from `from_hz` to `to_hz`.
+    """
+
+    name: str
+    site: Value[str]
+    threshold_um: Value[Annotated[float, Meta(gt=0)]]
+    corner_hz: Value[Hertz]
+    falling_db_octave: Value[Annotated[float, Meta(ge=0)]]
+    rising_db_octave: Value[Annotated[float, Meta(ge=0)]]
+    from_hz: Value[Hertz]
+    to_hz: Value[Hertz]
+    contactor_cm2: Value[Annotated[float, Meta(gt=0)]]
+
+    def at(self, hertz: float) -> tuple[float, float, float] | None:
+        """Return the threshold at a frequency (Hz) and the ends of its range, um; None outside the curve."""
+        if not float(self.from_hz) <= hertz <= float(self.to_hz):
+            return None
+        octaves = math.log2(hertz / float(self.corner_hz))
+        slope = -float(self.falling_db_octave) if octaves < 0 else float(self.rising_db_octave)
+        factor = 10.0 ** (slope * octaves / 20.0)
+        level = self.threshold_um
+        low, high = (level.value if end is None else end for end in (level.low, level.high))
+        return factor * level.value, factor * low, factor * high
 
 
 @cache

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from unitcad.api.build_call import build_each
+from unitcad.api.build_call import BuildResult, build_each
 from unitcad.cli.output import print_json, progress, say_error, warn
 from unitcad.cli.shared_options import (
     AllowCode,
@@ -140,6 +140,8 @@ def build(
                 for line in result.lines:
                     warn(f"{result.manifest['name']}: {line}")
                 typer.echo(str(result.folder))
+            if len(results) > 1:
+                _print_differences(results)
         return all(result.ok for result in results)
 
     if not watch:
@@ -157,6 +159,17 @@ def build(
             except UnitcadError as error:
                 say_error(error, "object" if as_json else "text")
             warn("waiting for a save; Ctrl-C ends")
+
+
+def _print_differences(results: Sequence[BuildResult]) -> None:
+    """Print how results differ, on standard error."""
+    from unitcad.cli.tables import print_table  # loads rich, which one result does not need
+    from unitcad.pipeline.differences import differences
+
+    if rows := differences(results):
+        print_table(rows, "What differs", stderr=True)
+    else:
+        warn("The results do not differ.")
 
 
 def _print_faults(manifest: Manifest) -> None:

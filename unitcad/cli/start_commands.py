@@ -12,18 +12,23 @@ from msgspec import to_builtins
 
 from unitcad import catalogue
 from unitcad.casting.coupon import Coupon, write
+from unitcad.casting.leak_coupon import LeakCoupon, Readings
 from unitcad.catalogue.filters import SHORT, keep
 from unitcad.catalogue.moduli import moduli_note
 from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson, Out
 from unitcad.designs import shipped as designs
+from unitcad.documents import read_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import names_device, write_new
 from unitcad.meshcheck.rules.registry import rules
 from unitcad.rooms import file_kinds, load
+from unitcad.spec import convert
 from unitcad.text import some
 from unitcad.validation import default_template
+from unitcad.validation.cupboard import add_entry, read_cupboard
 from unitcad.validation.load import shipped_of
+from unitcad.validation.plain_data import changes_of
 from unitcad.validation.starter import comment_template
 
 
@@ -89,6 +94,7 @@ def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
         "tissue": lambda: _values(
             {f"{name}.{one.name}": one for name, of in catalogue.tissues().items() for one in of}
         ),
+        "touch": lambda: _values(dict(catalogue.touch())),
         "rules": lambda: {code: f"{rule.severity}: {rule.title}" for code, rule in rules().items()},
     }
 
@@ -198,21 +204,76 @@ def _first_comments(shipped: dict[str, Path]) -> dict[str, str]:
 
 def coupon(
     printer: Annotated[
-        str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
+        str,
+        typer.Argument(
+            metavar="PRINTER", help="A printer of the catalogue (unitcad list printers), or the cupboard's."
+        ),
     ],
+    read: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=VALUE|FILE",
+            help="Reading of a printed coupon, such as bore_mm=7.85, or a file of readings. Default: write the coupons.",
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option(metavar="NAME", help="Name of the printer's entry of your own.")] = "mine",
+    cupboard: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="File of what you own, to which --read adds the entry. Default: cupboard.toml."
+        ),
+    ] = None,
     out: Out = Path("out"),
     as_json: AsJson = False,
 ) -> None:
-    """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""
+    """Write two coupons to print first, or turn their readings into an entry of the printer.
 
-    chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
-    folder = write(chosen, out)
+    The fit coupon shows the clearances, the leak coupon seal, bore, ribs, tongue and squish. The last line printed is
+    the folder, or the file with the entry.
+    """
+    own = read_cupboard(cupboard).printers if cupboard and (cupboard.exists() or not read) else {}
+    leak = LeakCoupon(printer, own)
+    if read:
+        _read(leak, read, name, cupboard or Path("cupboard.toml"), as_json)
+        return
+    folder = write(leak.printer, out)
+    leak.write(folder)
     if as_json:
         fits = {
             fit.key: {"feature": fit.feature, "choose": fit.choose, "values_mm": list(fit.values_mm)}
-            for fit in Coupon(chosen).fits.values()
+            for fit in Coupon(leak.printer).fits.values()
         }
-        print_json({"folder": str(folder), "printer": printer, "fits": fits})
+        gauges = {
+            f"{gauge.name}_mm": {"place": gauge.place, "drawn_mm": round(gauge.drawn_mm, 4), "shows": gauge.shows}
+            for gauge in leak.gauges.values()
+        }
+        print_json({"folder": str(folder), "printer": printer, "fits": fits, "gauges": gauges})
     else:
-        typer.echo(Coupon(chosen).markdown())
+        typer.echo(Coupon(leak.printer).markdown())
+        typer.echo(leak.markdown())
         typer.echo(str(folder))
+
+
+def _read(leak: LeakCoupon, given: list[str], name: str, file: Path, as_json: bool) -> None:
+    """Print the options that readings give, and add the printer's entry to a cupboard."""
+    data = dict[str, Any]()
+    for text in given:
+        data |= changes_of([text]) if "=" in text else read_toml(Path(text))
+    readings = convert(data, Readings, "readings")
+    settings, advice = leak.settings(readings)
+    options = leak.options(settings, name)
+    if settings:
+        add_entry(file, "printers", name, leak.entry(settings, readings))
+    if as_json:
+        values = {each.key: {"value": each.value, "why": each.why} for each in settings}
+        cupboard = str(file) if settings else None
+        print_json({"settings": values, "advice": advice, "options": options, "cupboard": cupboard})
+        return
+    for each in settings:
+        typer.echo(f"{each.key} = {each.value:g}: {each.why}")
+    for said in advice:
+        typer.echo(said)
+    if options:
+        typer.echo(f"unitcad build SPEC {' '.join(options)}")
+        typer.echo(f"printers.{name} is in:")
+        typer.echo(str(file))

@@ -24,13 +24,13 @@ def console(stderr: bool = False) -> Console:
     return made
 
 
-def print_table(rows: Sequence[Mapping[str, str]], title: str = "") -> None:
-    """Print a row a line; the keys of a row are the heads of the columns."""
+def print_table(rows: Sequence[Mapping[str, str]], title: str = "", stderr: bool = False) -> None:
+    """Print a row a line, on standard output or error; the keys of a row are the heads of the columns."""
     if rows:
         table = Table(*(Column(head, no_wrap=i == 0) for i, head in enumerate(rows[0])), title=title or None)
         for row in rows:
             table.add_row(*row.values())
-        console().print(table)
+        console(stderr).print(table)
 
 
 @contextlib.contextmanager

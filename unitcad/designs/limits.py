@@ -144,8 +144,6 @@ def check_wires(spec: Spec, dims: Dimensions) -> None:
     wires = spec.wires
     if not wires:
         return
-    if spec.fpcb:
-        raise Refusal("wires", "a table", "wires take the place of a circuit; leave out [fpcb] or [wires]")
     at_most("wires.diameter_mm", wires.diameter_mm, dims.motor_height / 2, "half the motor's thickness is")
     bundle = wires.count * (wires.diameter_mm + WIRE_GAP) - WIRE_GAP
     widest = widest_exit(spec, dims)

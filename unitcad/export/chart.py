@@ -86,6 +86,84 @@ def chart(
     return page(WIDTH, HEIGHT, parts)
 
 
+@dataclass(frozen=True)
+class Estimated:
+    """A row of `dot_plot`: a value with its range, None if it has none, and the measured value if there is one.
+
+    `reason`: why there is neither value nor range.
+    """
+
+    name: str
+    value: float | None
+    low: float | None
+    high: float | None
+    measured: float | None = None
+    reason: str = ""
+
+
+ROW, NAME_WIDTH = 30, 200
+"""Height of a row of a dot plot, and the width of its names, px."""
+
+
+def dot_plot(rows: Sequence[Estimated], title: str, label: str, range_name: str) -> str:
+    """Return rows of a dot with its range and the measured value on one logarithmic axis, as an SVG document.
+
+    Values must be positive. A row without range has its reason as text.
+    """
+    left, right, top = NAME_WIDTH, WIDTH - 24, 66
+    bottom = top + ROW * len(rows)
+    shown = [one for row in rows for one in (row.value, row.low, row.high, row.measured) if one]
+    low, high = (min(shown), max(shown)) if shown else (1.0, 10.0)
+    ticks = _steps_of_125(low, high)
+    first, last = math.log(ticks[0]), math.log(ticks[-1])
+
+    def at(value: float) -> float:
+        return left + (math.log(value) - first) / (last - first) * (right - left)
+
+    parts = [text(12, 22, title, size=14)]
+    parts += [_spot(left + 6, 42), text(left + 18, 46, "estimate")]
+    parts += [_reach(left + 96, left + 126, 42), text(left + 132, 46, range_name)]
+    parts += [_diamond(left + 246, 42), text(left + 258, 46, "measured")]
+    for tick in ticks:
+        parts.append(line(at(tick), top, at(tick), bottom, _GRID))
+        parts.append(text(at(tick), bottom + 16, f"{tick:g}", "middle"))
+    parts.append(line(left, bottom, right, bottom, _DARK))
+    for i, row in enumerate(rows):
+        y = top + ROW * (i + 0.5)
+        name = row.name if len(row.name) <= LEGEND_LETTERS else f"{row.name[: LEGEND_LETTERS - 1]}…"
+        parts.append(text(left - 10, y + 4, name, "end"))
+        if row.low and row.high:
+            parts.append(_reach(at(row.low), at(row.high), y))
+        elif row.reason:
+            parts.append(text(left + 6, y + 4, f"no level: {row.reason}", size=11))
+        parts += [_spot(at(row.value), y)] if row.value else []
+        parts += [_diamond(at(row.measured), y)] if row.measured else []
+    parts.append(text((left + right) / 2, bottom + 36, label, "middle"))
+    return page(WIDTH, bottom + 48, parts)
+
+
+def _steps_of_125(low: float, high: float) -> list[float]:
+    """Return 1, 2 and 5 times powers of ten from below `low` to above `high`, two or more."""
+    powers = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 2)
+    every = [step * 10.0**power for power in powers for step in (1, 2, 5)]
+    first = max(i for i, value in enumerate(every) if value <= low * (1 + 1e-9))
+    last = min(i for i, value in enumerate(every) if value >= high * (1 - 1e-9))
+    return every[first : max(last, first + 1) + 1]
+
+
+def _spot(x: float, y: float) -> str:
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="{COLOURS[0]}"/>'
+
+
+def _reach(x0: float, x1: float, y: float) -> str:
+    return line(x0, y, x1, y, COLOURS[0], ' stroke-width="8" stroke-opacity="0.3" stroke-linecap="round"')
+
+
+def _diamond(x: float, y: float) -> str:
+    points = " ".join(f"{x + dx:.1f},{y + dy:.1f}" for dx, dy in ((0, -6), (6, 0), (0, 6), (-6, 0)))
+    return f'<polygon points="{points}" fill="none" stroke="{_DARK}" stroke-width="1.8"/>'
+
+
 def page(width: float, height: float, parts: Sequence[str]) -> str:
     """Return a drawing as an SVG document on white."""
     size = f'width="{coord(width)}" height="{coord(height)}"'

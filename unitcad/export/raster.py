@@ -331,7 +331,7 @@ def finish(
     shown = shown[::SHARPER, ::SHARPER]
     picture = Image.fromarray(colour).convert("RGB")
     names = [*name_layers(layers, labels, shown, view), *names]
-    pen, font = ImageDraw.Draw(picture), _font()
+    pen, font = ImageDraw.Draw(picture), picture_font()
     for label in place_names(names, shown > 0, view):
         corner = SHARPER * label.left, SHARPER * label.top
         if label.end:
@@ -371,7 +371,7 @@ def name_layers(layers: Sequence[Layer], labels: Sequence[str], shown: np.ndarra
 def place_names(names: Sequence[Name], drawn: np.ndarray, view: Camera) -> list[Label]:
     """Give names a place in a picture, clear of the `drawn` pixels (height, width) and of each other."""
     covered = Image.fromarray(drawn.astype(np.uint8))
-    cover, font, labels = ImageDraw.Draw(covered), _font(), []
+    cover, font, labels = ImageDraw.Draw(covered), picture_font(), []
     for name in names:
         text = name.text if len(name.text) <= MOST_CHARACTERS else f"{name.text[: MOST_CHARACTERS - 3]}..."
         # Pillow's font has the letters of ASCII: others lose their accents.
@@ -392,10 +392,10 @@ def place_names(names: Sequence[Name], drawn: np.ndarray, view: Camera) -> list[
     return labels
 
 
-@lru_cache(maxsize=1)
-def _font() -> ImageFont.FreeTypeFont:
-    """Return Pillow's own font, set letter by letter, which is the same on every machine."""
-    font = ImageFont.load_default(SHARPER * LETTER_PX)
+@lru_cache(maxsize=16)
+def picture_font(size: float = SHARPER * LETTER_PX) -> ImageFont.FreeTypeFont:
+    """Return Pillow's own font of a size (px), set letter by letter, which is the same on every machine."""
+    font = ImageFont.load_default(size)
     assert isinstance(font, ImageFont.FreeTypeFont), "Pillow lacks FreeType"
     return font.font_variant(layout_engine=ImageFont.Layout.BASIC)
 

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold, OpType
 
-from unitcad.casting.preparation import in_resin
+from unitcad.casting.resin import in_resin
 from unitcad.export import drawing as sheet
 from unitcad.export import svg
 from unitcad.export.chart import coord

@@ -258,7 +258,7 @@ def _drawing(path: Path) -> str:
 def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str]) -> ResultsTable:
     """Return a batch's table, as `batch` (its batch.json) lists it, else from the manifests.
 
-    Chosen values come first, then the levels at the edge, then the rest. `damaged` says by folder why a result
+    The levels at the edge come first, then chosen values, then the rest. `damaged` says by folder why a result
     can't be read.
     """
     if batch:
@@ -275,32 +275,34 @@ def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], d
             for entry in entries
         ]
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
-    swept = _swept(columns)
-    columns = _in_order(columns, swept)
+    swept = swept_columns(columns)
+    columns = in_order(columns, swept)
     there = {each.folder for each in variants}
     rows = [
-        [folder if (folder := entry.get("folder")) in there else "", *(_cell(entry.get(c)) for c in columns)]
+        [folder if (folder := entry.get("folder")) in there else "", *(cell(entry.get(c)) for c in columns)]
         for entry in entries
     ]
     return ResultsTable(columns, rows, [name for name in columns if name in swept])
 
 
-def _swept(columns: list[str]) -> set[str]:
+def swept_columns(columns: list[str]) -> set[str]:
     """Return the columns of chosen values: those before `name` in a batch; else the spec's."""
     before = columns[: columns.index("name")] if "name" in columns else []
     given = {name for name in columns if name in ("design", "diameter_mm") or name.startswith("layers.")}
     return {name for name in before if name not in OF_EVERY_BATCH} | given
 
 
-def _in_order(columns: list[str], swept: set[str]) -> list[str]:
-    """Order columns: name, swept values, the edge's levels, the rest."""
+def in_order(columns: list[str], swept: set[str]) -> list[str]:
+    """Order columns: name, the edge's levels, swept values, the rest, the index."""
 
     def place(name: str) -> int:
         if name == "name":
             return 0
-        if name in swept:
+        if name.startswith("edge_"):
             return 1
-        return 2 if name.startswith("edge_") else 3
+        if name in swept:
+            return 2
+        return 4 if name == "index" else 3
 
     return sorted(columns, key=place)
 
@@ -323,7 +325,7 @@ def _row(record: VariantRecord) -> dict[str, Any]:
     return row
 
 
-def _cell(value: Any) -> Any:
+def cell(value: Any) -> Any:
     """Return a cell that the page can sort: a number, a text, or None."""
     if value is None or value == "":
         return None

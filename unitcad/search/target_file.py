@@ -13,7 +13,7 @@ wall_mm = [1.0, 2.0]
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,12 +25,12 @@ from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 from unitcad.catalogue.entries import between
-from unitcad.designs import shipped as designs
 from unitcad.documents import read_toml
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert
-from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, Moduli
+from unitcad.spec.raw import LEAST_LAYER, Moduli
+from unitcad.validation.cupboard import AtHandTable, Name, check_at_hand, cupboard_of
 from unitcad.validation.defaults import lab_fit
 from unitcad.validation.load import load_file
 
@@ -43,7 +43,6 @@ MOST_LAYERS = 2
 Layers = Annotated[int, between(1, MOST_LAYERS, "no unit of more was measured")]
 Wall = Annotated[float, between(LEAST_LAYER, 20)]
 Step = Annotated[float, between(0.01, 10)]
-Name = Annotated[str, Meta(min_length=1, max_length=60)]
 _SPEC_KEYS = ("motor", "fpcb", "wires", "moulds", "casting", "output")
 MOST_GEOMETRIES = 20_000
 """Sets of lengths that are tried; each costs about half a millisecond."""
@@ -77,27 +76,6 @@ class TargetTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     frequency_hz: Annotated[
         kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
     ] = None
-
-
-class AtHandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Silicones, motors, printer and bench at hand."""
-
-    materials: Annotated[
-        Annotated[tuple[Name, ...], Meta(min_length=1, max_length=20)] | None,
-        Meta(description="silicones at hand, by name; default: all shipped ones"),
-    ] = None
-    designs: Annotated[
-        Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10)] | None,
-        Meta(description="designs to try, by name; default: all shipped ones"),
-    ] = None
-    motors: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10, description="motors at hand, by name")] = (
-        DEFAULT_MOTOR,
-    )
-    printer: Annotated[Name, Meta(description="printer of the catalogue")] = "fdm-0.4"
-    scale_g: Annotated[float, between(1e-6, 1000, "smallest step of the scale")] = 0.01
-    cupboard: Annotated[str | None, Meta(description="file of what you own: a table at_hand, and own entries")] = None
-    room_c: Annotated[float, between(5, 45, "temperature of the room")] = 23.0
-    vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
 
 
 class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -152,15 +130,6 @@ class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     tissue: dict[str, dict[str, TissueEntry]] = {}
 
 
-class Cupboard(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a person owns: the table `at_hand` of his targets, and own entries."""
-
-    at_hand: AtHandTable
-    materials: dict[str, MaterialEntry] = {}
-    motors: dict[str, MotorEntry] = {}
-    printers: dict[str, PrinterEntry] = {}
-
-
 @dataclass(frozen=True)
 class Target:
     """A validated target.
@@ -198,7 +167,7 @@ def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path
     _check_target(asked.target)
     _check_ranges(asked.vary)
     _check_spec(asked.spec)
-    names, chosen = _check_names(asked.at_hand, asked)
+    names, chosen = check_at_hand(asked.at_hand, asked.materials, asked.motors, asked.printers)
     catalogue.tissue(asked.estimate.tissue, asked.tissue)
     text, fit = _fit(asked.estimate, folder)
     return Target(name, asked, names, chosen, _entries(asked, data, text), fit)
@@ -215,35 +184,12 @@ def _with_cupboard(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
         return data
     try:
         owned = read_toml(folder / name)
-        cupboard = convert(owned, Cupboard)
-        _check_names(cupboard.at_hand, cupboard)
-        if cupboard.at_hand.cupboard is not None:
-            raise Refusal("at_hand.cupboard", cupboard.at_hand.cupboard, "a cupboard names no other one")
+        cupboard_of(owned)
     except (UnitcadError, OSError) as error:
         raise Refusal("at_hand.cupboard", name, str(error)) from None
     given = {key: data[key] for key in ("materials", "motors", "printers") if isinstance(data.get(key), Mapping)}
     entries = {key: {**owned[key], **given.get(key, {})} for key in owned if key != "at_hand"}
-    return {**data, **entries, "at_hand": {**owned["at_hand"], **at_hand}}
-
-
-def _check_names(at_hand: AtHandTable, own: TargetFile | Cupboard) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the silicones at hand and the designs to try. Raises Refusal for an unknown name, and for one twice."""
-    names = _named("at_hand.materials", at_hand.materials, catalogue.materials(own.materials))
-    chosen = _named("at_hand.designs", at_hand.designs, {n: d for n, d in designs().items() if d.passes is not None})
-    _named("at_hand.motors", at_hand.motors, catalogue.motors(own.motors))
-    _named("at_hand.printer", [at_hand.printer], catalogue.printers(own.printers))
-    return names, chosen
-
-
-def _named(field: str, given: Sequence[str] | None, known: Mapping[str, Any]) -> tuple[str, ...]:
-    names = tuple(known) if given is None else tuple(given)
-    for i, name in enumerate(names):
-        at = field if field.endswith("printer") else f"{field}.{i}"
-        if name not in known:
-            raise unknown_name(at, name, known)
-        if name in names[:i]:
-            raise Refusal(at, name, "is given twice")
-    return names
+    return {**data, **entries, "at_hand": {**owned.get("at_hand", {}), **at_hand}}
 
 
 def _fit(table: ModelsTable, folder: Path) -> tuple[str, LabFit | None]:

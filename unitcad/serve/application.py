@@ -21,7 +21,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.json_text import parse_message
 from unitcad.report.page import page_data
-from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
+from unitcad.serve.jobs import Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
@@ -136,16 +136,11 @@ class Live:
 
     async def sweep(self, sweep: Sweep) -> bytes:
         """Start the batch of a key's values."""
-        if not sweep.low < sweep.high:
-            raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
+        values = values_of(sweep)
         given, code = await self._resolved(sweep.text)
-        step = (sweep.high - sweep.low) / (sweep.count - 1)
-        values: list[float] = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
-        if all(value.is_integer() for value in values):
-            values = [int(value) for value in values]  # a count of units takes no 3.0
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
-        # A folder of its own, which has the sweep file next to the results.
-        arguments = ["batch", "{sweep}", "-o", f"{{folder}}/{RESULTS}", "--report", *code]
+        # A folder of its own, which has the sweep file next to the results, in RESULTS: the file's name.
+        arguments = ["batch", "{sweep}", "-o", "{folder}", "--report", *code]
         # The base has only the keys of the text: defaults follow the key's values as they do on the page.
         files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
         state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.out), first)
@@ -228,6 +223,21 @@ def _post(path: str, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> 
             return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
 
     return Route(path, endpoint, methods=["POST"])
+
+
+def values_of(sweep: Sweep) -> list[float] | list[str]:
+    """Return the values of a sweep. Raises Refusal for fewer than two."""
+    if sweep.words:
+        words = list(dict.fromkeys(sweep.words))
+        if len(words) < 2:
+            raise Refusal("words", words[0], "a sweep needs two values or more")
+        return words
+    if not sweep.low < sweep.high:
+        raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
+    step = (sweep.high - sweep.low) / (sweep.count - 1)
+    values = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
+    # A count of units takes no 3.0.
+    return [int(value) for value in values] if all(value.is_integer() for value in values) else values
 
 
 def _write(path: Path, content: bytes, replace: bool) -> None:

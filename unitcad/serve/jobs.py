@@ -25,7 +25,7 @@ STAGE = "stage: "
 GRACE_S = 10.0
 """Seconds that a cancelled job may take to write its results."""
 MOST_LINES = 200
-RESULTS = "results"
+RESULTS = "sweep"
 """Folder of a sweep's results in its folder."""
 
 

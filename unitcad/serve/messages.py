@@ -69,13 +69,14 @@ class Build(Message, frozen=True, kw_only=True):
 
 
 class Sweep(Message, frozen=True, kw_only=True):
-    """A request for a batch: the values of one key from `low` to `high`, `count` of them."""
+    """A request for a batch: the values of one key from `low` to `high`, `count` of them; of a key of words `words`."""
 
     text: Text
     key: Path
-    low: float
-    high: float
-    count: Annotated[int, Meta(ge=2, le=50)]
+    low: float = 0.0
+    high: float = 0.0
+    count: Annotated[int, Meta(ge=2, le=50)] = 2
+    words: Annotated[list[Annotated[str, Meta(min_length=1, max_length=120)]], Meta(max_length=50)] = []
 
 
 class Cancel(Message, frozen=True, kw_only=True):

@@ -296,8 +296,8 @@ class RawSpec(Table, frozen=True, kw_only=True):
     motor: Annotated[MotorTable | bool, Meta(description="the motor; false: none, for a custom design")] = MotorTable(
         part=DEFAULT_MOTOR
     )
-    fpcb: FpcbTable | None = None
-    wires: WiresTable | None = None
+    fpcb: Annotated[FpcbTable | bool | None, Meta(description="the flexible circuit; false: none")] = None
+    wires: Annotated[WiresTable | bool | None, Meta(description="wires in place of a circuit; false: none")] = None
     layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15, description=_LAYERS)]
     moulds: MouldsTable = MouldsTable()
     casting: CastingTable = CastingTable()

@@ -89,10 +89,10 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
         The silicone layers, from the inside out; one is a single-layer control.
     motor : Motor or dict, optional
         The motor. Default: the part LCM0720A3463F.
-    fpcb : Fpcb or dict, optional
-        The flexible circuit. Default: none.
-    wires : Wires or dict, optional
-        Wires in place of a circuit. Default: none.
+    fpcb : Fpcb, dict or False, optional
+        The flexible circuit. Default: none, as False.
+    wires : Wires, dict or False, optional
+        Wires in place of a circuit. Default: none, as False.
     moulds, casting, estimate, output : Moulds, Casting, Estimate, Output or dict, optional
         Settings. Default: the defaults of each class.
     materials, motors, printers, tissue : mapping, optional
@@ -116,6 +116,8 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
     """
 
     motor: MotorSize = DERIVED
+    fpcb: FpcbTable | None = None
+    wires: WiresTable | None = None
     layers: tuple[CastLayer, ...]
 
     if TYPE_CHECKING:
@@ -129,8 +131,8 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
             layers: Sequence[LayerTable | _Keys],
             skin_mm: float = 0.0,
             motor: MotorTable | _Keys | bool = ...,
-            fpcb: FpcbTable | _Keys | None = None,
-            wires: WiresTable | _Keys | None = None,
+            fpcb: FpcbTable | _Keys | bool | None = None,
+            wires: WiresTable | _Keys | bool | None = None,
             moulds: MouldsTable | _Keys = ...,
             casting: CastingTable | _Keys = ...,
             estimate: EstimateTable | _Keys = ...,
@@ -225,7 +227,7 @@ def assumed_lengths(spec: Spec, given: Container[str] = (), path: str = "") -> d
     }
     if (key := "motor.thickness_mm") in found and motor and motor.thickness_mm.high:
         proud = motor.thickness_mm.high - spec.motor.thickness_mm
-        found[key] += f": up to {number(proud, 2)} mm out of the skin's plane"
+        found[key] += f"; one of {number(motor.thickness_mm.high, 3)} mm stands {number(proud, 2)} mm out at the skin"
     if spec.fpcb and spec.fpcb.thickness_mm == FpcbTable().thickness_mm:
         found["fpcb.thickness_mm"] = "usual stock"
     return {key: how for key, how in found.items() if path + key not in given}

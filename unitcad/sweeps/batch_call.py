@@ -103,10 +103,13 @@ _MOST_ROWS = 20
 
 
 def place(sweep: Sweep, out: str | None) -> tuple[Path, str | None]:
-    """Return the folder of a batch's journal and tables, and the address of the store of its variants, if it has one."""
-    if out is not None and not is_address(out):
-        return Path(out), None
-    return Path("out") / sweep.slug, out
+    """Return the folder of a batch's journal and tables, and the address of the store of its variants, if it has one.
+
+    `out` receives the folder, as that of a build does.
+    """
+    if is_address(out):
+        return Path("out") / sweep.slug, f"{out}{'' if str(out).endswith('/') else '/'}{sweep.slug}"
+    return Path("out" if out is None else out) / sweep.slug, None
 
 
 def make(
@@ -152,8 +155,8 @@ def batch(
     sweep : str, path or Sweep
         A file, or the name of a shipped sweep.
     out : path or str, optional
-        Folder of the batch, or ``"s3://bucket/prefix"`` for the variants of workers that share no disk; the tables are
-        then in the default folder too. Default: out/<name>.
+        Parent of the batch's folder, which has the sweep's name; or ``"s3://bucket/prefix"`` for the variants of workers
+        that share no disk: the tables are then in the default folder too. Default: out.
     set, formats, only, check
         As for `unitcad.build`; they apply to every variant.
     jobs : int, optional
@@ -184,7 +187,7 @@ def batch(
     Examples
     --------
     >>> from unitcad.sweeps import batch
-    >>> batch("published", "estimates", only="estimate", limit=2, jobs=0).ok
+    >>> batch("published", only="estimate", limit=2, jobs=0).ok
     True
     """
     check_number("jobs", jobs, 0, 1024, whole=True)

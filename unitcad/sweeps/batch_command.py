@@ -35,6 +35,7 @@ from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.batch_call import make, place, preview
 from unitcad.sweeps.journal import JournalEntry, Summary
+from unitcad.sweeps.level_table import check_table, write_table
 from unitcad.sweeps.object_store import is_address
 from unitcad.sweeps.run import BatchOptions, Watch
 from unitcad.sweeps.shard import shard_of
@@ -92,8 +93,7 @@ def batch(
             "-o",
             "--out",
             metavar="DIR",
-            help="Folder of the batch, or s3://BUCKET/PREFIX for workers that share no disk. "
-            "Default: out/NAME-OF-THE-SWEEP.",
+            help="Parent of the batch's folder, or s3://BUCKET/PREFIX for workers that share no disk. Default: out.",
         ),
     ] = None,
     jobs: Annotated[
@@ -145,6 +145,13 @@ def batch(
             help=f"Write report.html, one offline page. Default: on without --only, for at most {PAGE_UP_TO} variants.",
         ),
     ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a row a variant, the least level first, to FILE.csv or FILE.parquet, whatever else is made.",
+        ),
+    ] = None,
     no_check: NoCheck = False,
     code: AllowCode = False,
     as_json: AsJson = False,
@@ -158,6 +165,8 @@ def batch(
     expect_commas("SWEEP", others)
     if others:
         raise Refusal("SWEEP", others[0], "a batch takes one sweep; run a second batch for this one")
+    if table is not None:
+        check_table(table)
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
@@ -182,6 +191,8 @@ def batch(
     except KeyboardInterrupt:
         typer.echo(f"interrupted: finished variants stay in {store or folder}; the same command resumes", err=True)
         sys.exit(130)
+    if table is not None:
+        write_table(table, wanted, folder)
     if page or (part is None and (folder / PAGE).is_file()):  # one that is there is kept up
         with progress(folder.name) as say:
             say("page")

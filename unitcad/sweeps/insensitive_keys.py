@@ -23,7 +23,8 @@ from unitcad.report.read_results import SweptLevels
 from unitcad.spec import Spec
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import join_words
-from unitcad.validation import from_data, put
+from unitcad.validation import from_data
+from unitcad.validation.plain_data import apply
 
 _OF_THE_UNIT = re.compile(
     r"(design|diameter_mm|layers|motor|fpcb|wires|materials|motors|tissue|parameters"
@@ -117,7 +118,7 @@ def _levels(sweep: Sweep, index: int, path: str) -> list[float]:
     for value in _values(sweep, path):
         data = sweep.data(index)
         try:
-            put(data, path, value)
+            apply(data, {path: value})
             spec = from_data(data, Path())
             variant = estimate_input(spec)
         except UnitcadError:

@@ -39,9 +39,9 @@ from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, tab
 from unitcad.spec.paths import in_words, meant, paths_of
 from unitcad.spec.raw import RawSpec
 from unitcad.text import some
-from unitcad.validation import Changes, compound_kind, confirm_known, every_template, override, put, read
+from unitcad.validation import Changes, compound_kind, confirm_known, every_template, override, read
 from unitcad.validation.load import all_faults, is_path, load_file
-from unitcad.validation.plain_data import changes_of
+from unitcad.validation.plain_data import apply, changes_of
 
 
 def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
@@ -100,6 +100,8 @@ def label(values: Mapping[str, Any]) -> str:
             parts.append(f"{key}{value:.6g}")
         elif isinstance(value, list) and all(isinstance(each, int | float) for each in value):
             parts.append(f"{key}{'x'.join(f'{each:g}' for each in value)}")
+        elif isinstance(value, dict):
+            parts.append(f"{key}-{label(value)}".rstrip("-"))
     return "-".join(parts)[:_LABEL].rstrip("-.")
 
 
@@ -300,8 +302,7 @@ class Sweep:
         """Return the plain data of variant `index`. Raises Refusal for a path that leads nowhere."""
         base, values = self.values(index)
         data = parse_json(self._texts[base], base)
-        for path, value in values.items():
-            put(data, path, value)
+        apply(data, values)
         swept = {path: value for path, value in values.items() if path not in self._alone}
         if "name" not in values and isinstance(data.get("name"), str) and (named := label(swept)):
             data["name"] = f"{data['name'][: 49 - len(named)]}-{named}"
@@ -353,9 +354,9 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     bases: dict[str, dict[str, Any]] = {}
     for base in dict.fromkeys(named):
         bases[base] = _read_base(base, folder)
-        for path, value in file.fixed.items():
+        for path in file.fixed:
             check_path(path, bases[base], "set")
-            put(bases[base], path, value)
+        apply(bases[base], file.fixed)
     axes = {path: _values(path, given, table.mode) for path, given in values.items()}
     cases = tuple(
         (case.base or named[0], {"name": case.name, **values} if case.name else values) for case, values in typed

@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from msgspec import structs
 
@@ -20,7 +20,7 @@ from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.layers import Layers
-from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, FpcbTable, MouldsTable, RawSpec
+from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, FpcbTable, MouldsTable, RawSpec, WiresTable
 from unitcad.spec.resolved import CastLayer, MotorSize
 from unitcad.text import number, with_article
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from unitcad.attenuation.edge.ranges import LabFit
 
 FIELD = "estimate.fit"
+Lead = TypeVar("Lead", FpcbTable, WiresTable)
 _NEXT = "name a lab-fit.toml, which `unitcad fit LAB` writes from measured units"
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
@@ -44,13 +45,13 @@ def resolve(raw: RawSpec) -> Spec:
         if raw.design_source is None:
             raise Refusal("design_source", None, f"is required with design = {raw.design!r}")
         if is_body_file(raw.design) and raw.parameters:
-            raise Refusal("parameters", "...", f"nothing reads them: {raw.design} is a file of bodies")
+            raise Refusal("parameters", None, f"nothing reads them: {raw.design} is a file of bodies")
         if raw.skin_mm:
             raise Refusal("skin_mm", raw.skin_mm, "a custom design draws its own skin side", 0.0)
     else:
         for field in ("parameters", "design_source"):
             if getattr(raw, field):
-                raise Refusal(field, "...", f"only a custom design takes it; {raw.design} does not")
+                raise Refusal(field, None, f"only a custom design takes it; {raw.design} does not")
     design = design_of(raw)
     spec = _with_defaults(raw, design)
     if design.tooling == "complement":
@@ -106,8 +107,12 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
     known = catalogue.materials(raw.materials)
     for i, layer in enumerate(raw.layers):
         catalogue.choose(f"layers.{i}.material", layer.material, known)
-    moulds = _moulds(raw, design)
-    fpcb = _circuit(raw, design, motor)
+    fpcb, wires = _lead("fpcb", raw.fpcb), _lead("wires", raw.wires)
+    if fpcb and wires:
+        limit = "they take the place of a circuit; leave out one of the two, or set it to false"
+        raise Refusal("wires", None, limit)
+    moulds = _moulds(raw, design, least_slot(fpcb, wires, design.wire_sides))
+    fpcb = _circuit(fpcb, raw, design, motor)
     estimate = _estimate(raw, part)
     for name in (raw.estimate.tissue, *raw.tissue):
         catalogue.tissue(name, raw.tissue)
@@ -119,6 +124,7 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
             **structs.asdict(raw),
             "motor": motor,
             "fpcb": fpcb,
+            "wires": wires,
             "layers": tuple(
                 CastLayer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0)
                 for layer in raw.layers
@@ -164,15 +170,21 @@ def _no_motor(raw: RawSpec) -> MotorSize:
     return MotorSize(drive=UNKNOWN_DRIVE, absent=True, **sizes)
 
 
-def _moulds(raw: RawSpec, design: Design) -> MouldsTable:
-    """Return the tooling's lengths: the printer's where the spec gives none, the slot as high as what it takes.
+def _lead(field: str, given: Lead | bool | None) -> Lead | None:
+    """Return the circuit or the wires of a spec; None without. Raises Refusal for true."""
+    if given is True:
+        raise Refusal(field, given, "takes a table, or false for none", False)
+    return given or None
+
+
+def _moulds(raw: RawSpec, design: Design, least: float) -> MouldsTable:
+    """Return the tooling's lengths: the printer's by default, the slot at least as high as the lead in it (`least`).
 
     Heights that the spec does not give end whole layers of the printer.
     """
     printer = catalogue.choose("moulds.printer", raw.moulds.printer, catalogue.printers(raw.printers))
     given = structs.asdict(raw.moulds)
     lengths = {name: float(getattr(printer, name) or 0.0) for name in _PRINTER_LENGTHS if given[name] is None}
-    least = least_slot(raw.fpcb, raw.wires, design.wire_sides)
     if "slot_height_mm" in lengths:
         lengths["slot_height_mm"] = max(lengths["slot_height_mm"], least)
     layer = raw.moulds.layer_mm or lengths["layer_mm"]
@@ -205,9 +217,8 @@ def _for_leaves(printer: catalogue.Printer, lengths: dict[str, Any]) -> float:
     return least_skirt(leaf, pushed) + lengths["seat_relief_mm"]
 
 
-def _circuit(raw: RawSpec, design: Design, motor: MotorSize) -> FpcbTable | None:
+def _circuit(fpcb: FpcbTable | None, raw: RawSpec, design: Design, motor: MotorSize) -> FpcbTable | None:
     """Return the circuit with its pad, which the design sizes, and its tail's end, as wide as the tail."""
-    fpcb = raw.fpcb
     if fpcb is None:
         return None
     pad = fpcb.pad_diameter_mm

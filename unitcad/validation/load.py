@@ -20,7 +20,7 @@ from unitcad.spec import Spec, check_plain, convert, to_data
 from unitcad.spec.custom_code import is_body_file, is_custom, with_source
 from unitcad.spec.raw import RawSpec
 from unitcad.validation.defaults import resolve
-from unitcad.validation.plain_data import ABSENT, Changes, Source, at, changes_of, plain, put, requested_data
+from unitcad.validation.plain_data import ABSENT, Changes, Source, apply, at, changes_of, plain, requested_data
 from unitcad.validation.suggestions import every_fault, suggest
 
 
@@ -250,8 +250,7 @@ def override(data: Mapping[str, Any], changes: Changes) -> dict[str, Any]:
     """Return `data` with changes put in. Raises Refusal for a path that runs through something not there."""
     check_plain(data)
     result: dict[str, Any] = copy.deepcopy(dict(data))
-    for path, value in changes_of(changes).items():
-        put(result, path, value)
+    apply(result, changes_of(changes))
     return result
 
 

@@ -50,6 +50,36 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
         raise Refusal(path, value, "the path runs through a value, not a table")
 
 
+RIVALS = {"fpcb": "wires", "wires": "fpcb"}
+"""Tables of a spec of which one takes the place of the other."""
+
+
+def apply(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Put a person's changes into data. A circuit takes the place of wires, and wires that of a circuit.
+
+    Raises Refusal as `put`, and for an empty table, which may be meant as none.
+    """
+    for path, value in changes.items():
+        steps = path.split(".")
+        i = next((i for i, one in enumerate(steps) if one in RIVALS and steps[max(i - 1, 0)] in ("unit", one)), None)
+        if i is not None and value is not False:
+            own, rival = (".".join([*steps[:i], table]) for table in (steps[i], RIVALS[steps[i]]))
+            if path == own and value == {}:
+                _refuse_empty(path, steps[i])
+            if not any(f"{other}.".startswith(f"{rival}.") for other in changes if changes[other] is not False):
+                drop(data, rival)
+            if at(data, own) is False:
+                drop(data, own)
+        put(data, path, value)
+
+
+def _refuse_empty(path: str, table: str) -> None:
+    keys = fields_of(cast("type[Struct]", table_in(fields_of(RawSpec)[table].type)))
+    required = [key for key, field in keys.items() if field.required]
+    takes = f"a table with {required[0]}" if required else f"a table, with keys such as {', '.join([*keys][:3])}"
+    raise Refusal(path, {}, f"an empty table; takes {takes}, or false for none")
+
+
 _MOST_ENTRIES = 4
 ABSENT = object()
 """What `at` returns where nothing stands."""

@@ -5,7 +5,7 @@ Brackets have the 80 % range. A level is in per cent of the motor's amplitude.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from unitcad.attenuation.edge.answer import MOST, PAPER, Answer, Measured, ModelLevel
@@ -18,6 +18,7 @@ LEAST = 1e-4
 ANY_FORM = "a factor of about 1.3 to 1.4, whatever the form"
 """Leave-one-out error of the rules and class means that were tried on the nine units."""
 NO_EFFECT = "within the range: no effect shown"
+NOT_COMPARED = "not compared: a level is not known"
 SURFACE = (
     "The paper does not state on which surface or along which axis it measured. The rule is fitted to its levels as "
     "they are. The analytic model is the normal motion of the skin at the edge (|u_z|, equation 5b)."
@@ -82,21 +83,43 @@ def source_line(one: Answer) -> str:
 def analytic_line(one: Answer) -> str:
     """Return the level by the paper's analytic model, and its error."""
     if one.published.low is None:
+        if one.published.reason == one.reason:  # the line of the level has it
+            return "The paper's analytic model gives no number either."
         return f"The paper's analytic model gives no number: {one.published.reason}."
     error = f"a factor of {_factor(one.analytic_error)}"
     return f"The paper's analytic model gives {model_level(one.published)}. It misses a measured unit by {error}."
 
 
-def compared(one: Answer, before: Answer) -> str:
-    """Return how a level compares with another: model against model, and whether the ranges show an effect."""
+def effect(one: Answer, before: Answer) -> str:
+    """Return the factor between two levels, or that their ranges show none."""
     if one.level is None or before.level is None:
-        return "not compared: a level is not known"
+        return NOT_COMPARED
     inside = [
         own.low is None or own.high is None or own.low <= (other.level or 0.0) <= own.high
         for own, other in ((one, before), (before, one))
     ]
-    effect = NO_EFFECT if any(inside) else f"a factor of {number(one.level / before.level, 2)}"
-    return f"{percent(one.level)} against {percent(before.level)}: {effect}"
+    return NO_EFFECT if any(inside) else f"a factor of {number(one.level / before.level, 2)}"
+
+
+def comparison(named: Sequence[tuple[str, Answer]]) -> list[dict[str, str]]:
+    """Return a row of a table for each of several units: level and range, measurement, and the effect on the level.
+
+    The effect is against the first unit. Keys are the heads of the columns.
+    """
+    first, before = named[0]
+    rows = [
+        {
+            "unit": name,
+            "level, % (80 % range)": cell(one),
+            "measured, %": _measured(one.measured[0]).replace(" %", "") if one.measured else "-",
+            f"against {first}": "-" if one is before else effect(one, before),
+        }
+        for name, one in named
+    ]
+    if any(one.wider for _, one in named):
+        for row, (_, one) in zip(rows, named, strict=True):
+            row["no measured unit had its"] = join_words(one.wider) if one.wider else "-"
+    return rows
 
 
 def cell(one: Answer) -> str:
@@ -177,5 +200,7 @@ def skin_lines(layered: dict[str, Any], places_mm: tuple[int, ...] = (5, 10, 20)
     ends = {r: spread(drive["u"]["low"][i], drive["u"]["high"][i]).removesuffix(" %") for r, i in places}
     told = [f"{percent(drive['u']['value'][i])} ({ends[r]}) after {r} mm" for r, i in places]
     yield f"On the skin ({layered['tissue']}), of the motion at the edge: {join_words(told)}."
+    if short := layered["not_reached"]:
+        yield f"The skin's curve does not reach its accuracy. {'. '.join(short)}."
     if "far" in layered:
         yield layered["far"]

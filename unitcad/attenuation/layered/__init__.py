@@ -21,6 +21,7 @@ Waves in soft tissue are 4 mm long or longer up to 300 Hz.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -85,18 +86,24 @@ class Response:
         Bound of the error of each value, in the same unit and shape.
     wavenumbers : int
         Number of evaluated wavenumbers.
+    rtol : float
+        The wanted error over the largest |u|.
     error : float
         The largest bound.
     largest : float
         The largest |u| of a component.
+    reached : bool
+        Whether the largest bound is within rtol.
+    shortfall : str
+        The reached and the wanted error in words; empty if rtol is reached.
 
     Examples
     --------
     >>> from unitcad.attenuation import HalfSpace, LayeredMedium, LossFactor, UniformDisc
     >>> medium = LayeredMedium((), HalfSpace(1060.0, 20e3, 0.5, LossFactor(0.3)))
     >>> response = medium.response(UniformDisc(3.5e-3), omega=785.0, r=[0.01, 0.02])
-    >>> response.u_z.shape, bool(response.error < 1e-6 * response.largest)
-    ((2,), True)
+    >>> response.u_z.shape, response.reached, response.shortfall
+    ((2,), True, '')
     """
 
     u_r: Any
@@ -106,6 +113,7 @@ class Response:
     error_theta: Any
     error_z: Any
     wavenumbers: int
+    rtol: float
 
     @property
     def error(self) -> float:
@@ -117,8 +125,21 @@ class Response:
         """The largest |u| of a component."""
         return float(max(np.max(np.abs(u)) for u in (self.u_r, self.u_theta, self.u_z)))
 
+    @property
+    def reached(self) -> bool:
+        """Whether the error is within rtol of the largest |u|."""
+        return self.error <= self.rtol * self.largest
 
-def _of_rows(load: UniformDisc, rows: Array, errors: np.ndarray, wavenumbers: int) -> Response:
+    @property
+    def shortfall(self) -> str:
+        """The reached and the wanted error in words; empty if rtol is reached."""
+        if self.reached:
+            return ""
+        share = f"{self.error / self.largest:.2g} of the largest motion" if self.largest else "more than the motion"
+        return f"the error may be {share}, {self.rtol:.2g} was wanted"
+
+
+def _of_rows(load: UniformDisc, rows: Array, errors: np.ndarray, wavenumbers: int, rtol: float) -> Response:
     """Return the response of which these are the integrals, shape (rows, ...)."""
     if load.direction == "tangential":
         (a, b, c), (of_a, of_b, of_c) = rows, errors
@@ -126,7 +147,7 @@ def _of_rows(load: UniformDisc, rows: Array, errors: np.ndarray, wavenumbers: in
     else:
         zero = np.zeros(rows.shape[1:])
         u, error = (rows[0], zero + 0j, rows[1]), (errors[0], zero, errors[1])
-    return Response(*(part[()] for part in u), *(part[()] for part in error), wavenumbers=wavenumbers)
+    return Response(*(part[()] for part in u), *(part[()] for part in error), wavenumbers=wavenumbers, rtol=rtol)
 
 
 def _radii(r: Any) -> Array:
@@ -211,7 +232,8 @@ class LayeredMedium(Stack):
         r : float or array
             Radii, m, in any shape.
         rtol : float, default 1e-6
-            Wanted error over the largest |u| of all radii, 1e-12 to 0.1. If it can't be reached, the errors state so.
+            Wanted error over the largest |u| of all radii, 1e-12 to 0.1. If it can't be reached, the result says so:
+            `reached` is false, and `shortfall` has the reason.
 
         Returns
         -------
@@ -253,30 +275,41 @@ class LayeredMedium(Stack):
         if not (np.isfinite(found.total).all() and np.isfinite(found.error).all()):
             raise overflow(omega)
         total, error = (part.reshape(-1, *radii.shape) for part in (found.total, found.error))
-        return _of_rows(load, total, error, found.wavenumbers)
+        return _of_rows(load, total, error, found.wavenumbers, rtol)
 
 
 MOST_SOLVED = 400
 _PART, _LEAST, _NEAR, _FAR, _NEAR_TO = 1 / 6, 2e-5, 0.5e-3, 1e-3, 0.03
 
 
-def components(medium: LayeredMedium, load: UniformDisc, omega: float, radii: np.ndarray, rtol: float) -> np.ndarray:
+Told = Callable[[str], object]
+"""Gets the shortfall of a response that does not reach its rtol."""
+
+
+def unheard(shortfall: str) -> None:
+    """Take no notice of a shortfall."""
+
+
+def components(
+    medium: LayeredMedium, load: UniformDisc, omega: float, radii: np.ndarray, rtol: float, short: Told = unheard
+) -> np.ndarray:
     """Return u_r, u_theta and u_z (m/Pa, complex) at `radii` (m, any shape), shape (3, *radii.shape).
 
     The curve adds at most 5e-4 of the largest motion at the radii. Radii within the load or close to its edge are
-    always solved one by one. Raises as `LayeredMedium.response`.
+    always solved one by one. `short` gets the shortfall of a response that misses rtol. Raises as
+    `LayeredMedium.response`.
     """
     wanted = np.asarray(radii, dtype=float)
     distinct, at = np.unique(np.round(wanted.ravel(), 9), return_inverse=True)
     beyond = distinct > load.radius + _LEAST / _PART
     if np.count_nonzero(beyond) <= MOST_SOLVED:
-        found = _solved(medium, load, omega, distinct, rtol)
+        found = _solved(medium, load, omega, distinct, rtol, short)
     else:
         from scipy.interpolate import CubicSpline  # slow to load, and few need it
 
         single = distinct[~beyond]
         points = curve_points(load.radius, float(distinct[beyond][0]), float(distinct[-1]))
-        solved = _solved(medium, load, omega, np.concatenate([single, points]), rtol)
+        solved = _solved(medium, load, omega, np.concatenate([single, points]), rtol, short)
         curve = CubicSpline(points, solved[:, single.size :], axis=1)
         found = np.concatenate([solved[:, : single.size], curve(distinct[beyond])], axis=1)
     return found[:, at.ravel()].reshape(3, *wanted.shape)
@@ -291,6 +324,10 @@ def curve_points(reach: float, first: float, last: float) -> np.ndarray:
     return np.array(points)
 
 
-def _solved(medium: LayeredMedium, load: UniformDisc, omega: float, r: np.ndarray, rtol: float) -> np.ndarray:
+def _solved(
+    medium: LayeredMedium, load: UniformDisc, omega: float, r: np.ndarray, rtol: float, short: Told
+) -> np.ndarray:
     found = medium.response(load, omega, r, rtol=rtol)
+    if not found.reached:
+        short(found.shortfall)
     return np.stack([np.broadcast_to(part, r.shape) for part in (found.u_r, found.u_theta, found.u_z)])

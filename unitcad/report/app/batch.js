@@ -90,11 +90,13 @@
     // The level, if it reads what goes across; otherwise a volume, or anything.
     const best = (x) => [U.LEVEL].find((name) => numeric.includes(name) && filled(name) * 2 > table.rows.length && !blind(x, name))
       || preferred(numeric.filter((name) => !blind(x, name)), /volume|mm3/) || numeric.find((name) => name !== x && !blind(x, name)) || names[names.length - 1];
-    const across = preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0];
+    // Across goes a swept key that the level reads, or any swept one.
+    const chosen = varying.filter((name) => table.swept.has(name) && name !== nameColumn);
+    const across = chosen.find((name) => !unread.includes(name)) || preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0];
     const controls = el("div", { className: "tools" },
       choice("x", "Across", names, across),
       choice("y", "Up", names, best(across)),
-      choice("group", "Colour", ["", ...texts], preferred(texts, /design|material/) || ""));
+      choice("group", "Colour", ["", ...texts], preferred(texts.filter((name) => name !== across), /design|material/) || ""));
     const geometries = Object.keys(data.models).length;
     // A batch of estimates alone has no folders.
     const failed = table.rows.filter((row) => !row[0] && !(table.columns.includes("status") && row[at("status")] === "ok")).length;

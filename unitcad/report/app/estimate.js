@@ -262,5 +262,5 @@
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
-  Object.assign(window.unitcad, { estimate, compared });
+  Object.assign(window.unitcad, { estimate, compared, rule });
 })();

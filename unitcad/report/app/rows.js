@@ -1,8 +1,9 @@
 // Rows of a batch as people read them: named by what was swept, levels in per cent with their range, three digits.
 (() => {
   "use strict";
-  const { number } = window.unitcad;
+  const { el, number, rule, theme } = window.unitcad;
   const [LEVEL, LOW, HIGH, MEASURED] = ["edge_level", "edge_low", "edge_high", "edge_measured"];
+  const LONGEST = 28;
   const UNIT = /_(mm3|mm|g|hz|um|c|s|kpa)$/;
   const UNITS = { mm3: "mm³", mm: "mm", g: "g", hz: "Hz", um: "µm", c: "°C", s: "s", kpa: "kPa" };
 
@@ -31,18 +32,38 @@
     });
     const range = (column, row) => (column === LEVEL ? ranges.get(row) || null : null);
     const digits = (column) => (swept.has(column) ? 6 : 3);
+    // Two digits, as the command prints them: 4.0, 15.
+    const two = (value) => (value > 0.0995 && value < 9.95 ? value.toPrecision(2) : number(value, 2));
     const shown = (column, value, row) => {
       const found = row && range(column, row);
-      if (found) return [typeof value === "number" && number(value, 2), `(${found.map((end) => number(end, 2)).join(" to ")})`].filter(Boolean).join(" ");
+      if (found) return [typeof value === "number" && two(value), `(${found.map(two).join(" to ")})`].filter(Boolean).join(" ");
       if (typeof value !== "number") return number(value);
-      return number(value, Number.isInteger(value) ? 6 : column === MEASURED ? 2 : digits(column));
+      return column === MEASURED ? two(value) : number(value, Number.isInteger(value) ? 6 : digits(column));
     };
+    const levels = percents.filter(Boolean).flatMap((i) => whole.map((row) => row[i])).filter((value) => typeof value === "number" && value > 0);
+    const axis = levels.length ? rule(levels) : null;
+    const measuredAt = columns.indexOf(MEASURED) + 1;
+    // A row's level, range and measurement on the axis of all rows; null for a cell without.
+    const picture = (column, row) => {
+      if (column !== LEVEL || !axis) return null;
+      const placed = (className, value, end) => {
+        const node = el("span", { className });
+        node.style.left = `${axis.at(value)}%`;
+        if (end !== undefined) node.style.width = `${Math.max(0.6, axis.at(end) - axis.at(value))}%`;
+        if (className !== "measured") theme.watch(node, () => { node.style.background = theme.colour(className === "grid" ? "line" : "series-1"); });
+        return node;
+      };
+      const [value, ends, measured] = [row[columns.indexOf(LEVEL) + 1], ranges.get(row), measuredAt ? row[measuredAt] : null];
+      return el("div", { className: "track", "aria-hidden": "true" }, axis.ticks.map((tick) => placed("grid", tick)),
+        ends && placed("bar", ...ends), typeof value === "number" && value > 0 && placed("dot", value), typeof measured === "number" && measured > 0 && placed("measured", measured));
+    };
+    const legend = axis && `Dot: level. Bar: 80 % range. Diamond: measured. Lines: ${axis.ticks.map((tick) => number(tick)).join(", ")} %, logarithmic.`;
     const heads = { [LEVEL]: "level at the edge, % (80 % range)", [MEASURED]: "measured, %" };
     const head = (column) => heads[column] || column;
-    return { ...table, columns, rows, digits, shown, range, head, swept };
+    return { ...table, columns, rows, digits, shown, range, head, swept, picture, legend };
   }
 
-  // What tells a row from the others: its name, and where names repeat the values that were swept and vary.
+  // Text that tells a row from the others: its own name, or its swept values if names repeat or list them.
   function namer(table, nameColumn, varying) {
     const at = (name) => table.columns.indexOf(name) + 1;
     const own = (row) => String(row[at(nameColumn)] ?? row[0] ?? "–");
@@ -57,9 +78,11 @@
       return name.endsWith("material") || name === "design" ? String(cell) : `${words} ${cell}`;
     };
     return (row) => {
-      if (counts.get(own(row)) === 1) return own(row);
-      const values = told.map((name) => value(row, name)).filter((text) => text !== null && text !== own(row));
-      return values.length ? `${own(row)}: ${values.join(", ")}` : own(row);
+      // A long name made of the swept values says them less well than the values themselves.
+      const made = told.some((name) => row[at(name)] !== null && own(row).includes(String(row[at(name)])));
+      if (counts.get(own(row)) === 1 && !(made && own(row).length > LONGEST)) return own(row);
+      const values = told.map((name) => value(row, name)).filter((text) => text !== null);
+      return values.length ? values.join(", ") : own(row);
     };
   }
 

@@ -1,7 +1,7 @@
 // A sortable, filterable table of variants, a page at a time.
 (() => {
   "use strict";
-  const { el, clear, filterOf, containing, kindsOf } = window.unitcad;
+  const { el, clear, filterOf, containing, kindsOf, LEVEL } = window.unitcad;
   const PAGE = 100;
 
   // Numbers before texts, nothing last whichever way.
@@ -24,8 +24,9 @@
     const same = constants(table.columns, table.rows);
     const kinds = table.columns.map((name, i) => ({ ...kindsOf(table.rows.map((row) => row[i + 1])), digits: table.digits(name) }));
     const fault = el("p", { className: "fault", id: "filters-fault", role: "status" });
-    const state = { sort: null, direction: 1, filters: new Map(), search: "", page: 0, all: false };
-    const columns = () => table.columns.map((name, i) => ({ name, at: i + 1 })).filter(({ name }) => state.all || !same.has(name) || name === nameColumn);
+    const levelAt = table.columns.indexOf(LEVEL) + 1;
+    const state = { sort: levelAt && !same.has(LEVEL) ? levelAt : null, direction: 1, filters: new Map(), search: "", page: 0, all: false };
+    const columns = () => table.columns.map((name, i) => ({ name, at: i + 1 })).filter(({ name }) => state.all || !same.has(name) || name === nameColumn || name === LEVEL);
     const body = el("tbody");
     const heads = el("tr");
     const filters = el("tr", { className: "filters" });
@@ -87,7 +88,8 @@
       clear(body, rows.slice(first, first + PAGE).map((row) => el("tr", {}, columns().map(({ name, at }) => {
         const value = row[at];
         if (name === nameColumn) return el("th", { scope: "row" }, el("div", { className: "lead-in" }, lead(row), row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, named(row)) : named(row)));
-        return el("td", { className: typeof value === "number" ? "number" : undefined }, table.shown(name, value, row));
+        const picture = table.picture(name, row);
+        return el("td", { className: picture ? "level" : typeof value === "number" ? "number" : undefined }, table.shown(name, value, row), picture);
       }))));
       count.textContent = `${rows.length} of ${table.rows.length} variants`;
       const step = (by, text) => el("button", { type: "button", disabled: state.page + by < 0 || state.page + by >= pages, onclick: () => { state.page += by; update(); } }, text);
@@ -95,7 +97,7 @@
       changed(rows);
     }
 
-    const known = [...same].filter((name) => name !== nameColumn).map((name) => {
+    const known = [...same].filter((name) => name !== nameColumn && name !== LEVEL).map((name) => {
       const value = table.rows[0][table.columns.indexOf(name) + 1];
       return value === null || value === undefined ? null : el("li", {}, `${table.head(name)} = ${table.shown(name, value)}`);
     }).filter(Boolean);
@@ -104,6 +106,7 @@
       fault,
       known.length > 0 && el("details", {}, el("summary", {}, `The same everywhere: ${known.length} columns`), el("ul", { className: "chips" }, known)),
       el("div", { className: "scroll tall", tabindex: "0", role: "group", "aria-label": "Variants" }, grid),
+      table.legend && el("p", { className: "note" }, table.legend),
       pager);
     layout();
     update();

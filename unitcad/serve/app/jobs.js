@@ -15,7 +15,8 @@
   };
 
   // options: server, text(), name, folder, numbers() gives [{path, kind, value, low, high}] of the form's numbers.
-  function createJobs({ server, text, name, folder, numbers }) {
+  // silicones() gives [{path, usual}] of the fields of silicones.
+  function createJobs({ server, text, name, folder, numbers, silicones }) {
     const progress = el("div", { className: "job", role: "status", tabindex: "-1" });
     // Beside what is written anew, so that it keeps the focus.
     const cancel = el("button", { type: "button", hidden: true, onclick: () => server.send("/cancel", { job: running }) }, "Cancel");
@@ -94,7 +95,12 @@
     const low = el("input", { type: "number", step: "any", id: "sweep-low" });
     const high = el("input", { type: "number", step: "any", id: "sweep-high" });
     const count = el("input", { type: "number", min: "2", max: "50", step: "1", value: "5", id: "sweep-count" });
+    const words = el("input", { type: "text", id: "sweep-words", size: "48" });
     const offer = () => {
+      const silicone = silicones().find((each) => each.path === key.value);
+      for (const each of [low, high, count]) each.parentElement.hidden = Boolean(silicone);
+      words.parentElement.hidden = !silicone;
+      if (silicone) words.value = silicone.usual.join(", ");
       const one = numbers().find((each) => each.path === key.value);
       if (!one) return;
       const whole = one.kind === "integer";
@@ -112,10 +118,11 @@
 
     function keys() {
       const chosen = key.value;
-      clear(key, numbers().map((each) => el("option", { value: each.path }, each.path)));
+      // Silicones first: the level reads them, and no length.
+      clear(key, [...silicones(), ...numbers()].map((each) => el("option", { value: each.path }, each.path)));
       key.value = chosen;
       if (!chosen || key.value !== chosen) {
-        const usual = ["layers.0.wall_mm", "layout.pitch_mm"].find((path) => numbers().some((each) => each.path === path));
+        const usual = ["layout.pitch_mm", "layers.0.material"].find((path) => [...key.options].some((option) => option.value === path));
         if (usual) key.value = usual;
         offer();
       }
@@ -129,6 +136,12 @@
     };
     const sweep = async () => {
       clear(said);
+      if (!words.parentElement.hidden) {
+        const chosen = [...new Set(words.value.split(",").map((word) => word.trim()).filter(Boolean))];
+        if (chosen.length < 2) clear(progress, el("p", { className: "fault" }, "A sweep needs two silicones or more, with commas between them."));
+        else follow(await server.send("/sweep", { text: text(), key: key.value, words: chosen }));
+        return;
+      }
       if (![low, high, count].every((one) => one.value !== "" && one.checkValidity())) {
         clear(progress, el("p", { className: "fault" }, "A sweep needs its two ends, and from 2 to 50 values."));
         return;
@@ -144,7 +157,7 @@
     const field = (label, control) => el("label", {}, `${label} `, control);
     const node = section("do", "Save, build, sweep",
       el("div", { className: "tools" }, field(`Spec file in ${folder}`, file), el("button", { type: "button", onclick: () => save(false) }, "Save spec")), said,
-      el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
+      el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count), field("silicones", words),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
       progress, cancel, log);
     return { node, keys, suggest, button: el("button", { type: "button", className: "main", onclick: build }, "Build this") };

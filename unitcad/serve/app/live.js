@@ -53,7 +53,7 @@
     const batch = data.batch && createBatch(data.batch);
     const view = section("view", "3D", figures, glance, others, host);
     const pinned = U.createPinned({ current, restore: replaceText, before: kept.pinned, keep });
-    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
+    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers, silicones });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
     clear(page,
       el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, jobs.button, theme.button())),
@@ -81,6 +81,13 @@
       return state.groups.flatMap((group) => group.fields).filter((field) => ["number", "integer"].includes(field.kind) && typeof field.value === "number");
     }
 
+    // Keys of one word of several that a unit's silicones are: what the level reads. `usual` are the silicones whose
+    // modulus is known, with the one that is there.
+    function silicones() {
+      const fields = state.groups.flatMap((group) => group.fields).filter((field) => field.kind === "word" && /(^|\.)layers\.\d+\.material$/.test(field.path));
+      return fields.map((field) => ({ ...field, usual: field.choices.filter(([name, modulus]) => name === field.value || /^[\d.]+ kPa$/.test(modulus)).map(([name]) => name) }));
+    }
+
     // Another motor brings its own size and drive: those of the text go.
     function sizes(path) {
       const own = ["motor.diameter_mm", "motor.thickness_mm", "motor.drive"];
@@ -95,7 +102,7 @@
       const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.line : (estimate.lines || [])[0];
       const failed = (moulds.checks || []).filter((check) => !check.ok).length;
       const level = estimate.estimate && estimate.estimate.answer;
-      const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
+      const more = moulds.checks ? [["checks", moulds.checks.length - failed, `of ${moulds.checks.length}`]] : [];
       return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, level, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
 
@@ -312,7 +319,7 @@
         clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view shows only the ${noun()}.`));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
-      } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.mould_checks.length} mould checks failed` : `${manifest.mould_checks.length} mould checks passed`);
+      } else said(failed.length ? "bad" : "good", `checks: ${manifest.mould_checks.length - failed.length} of ${manifest.mould_checks.length}`);
     }
 
     function toForm() { page.querySelector("#spec").focus({ preventScroll: true }); }
