@@ -21,7 +21,7 @@ from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.summary import as_printed, assumed_line, checks_text, to_open
-from unitcad.skin_map import MapFile
+from unitcad.report.map_file import MapFile
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
