@@ -1,7 +1,10 @@
 """The map of one unit: its table against the solver, its figures against root finding, its picture, and refusals."""
 
+import base64
+import gzip
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -125,7 +128,7 @@ def test_the_picture_has_the_line_where_the_felt_radius_is():
     assert np.linalg.norm(ends, axis=-1) == pytest.approx(made.kinds[0].felt_mm.value, abs=0.05)
 
 
-@pytest.mark.parametrize("form", ["svg", "png"])
+@pytest.mark.parametrize("form", ["svg", "png", "html"])
 def test_the_command_writes_the_map_and_prints_both_figures(form, tmp_path):
     path = tmp_path / f"map.{form}"
     done = unitcad("estimate", "encapsulating", "--map", str(path), "--threshold", "2", "--share", "20")
@@ -137,6 +140,13 @@ def test_the_command_writes_the_map_and_prints_both_figures(form, tmp_path):
     if form == "svg":
         assert path.read_text().count("<image") == 2
         assert "Felt radius: 33 mm" in path.read_text()
+    elif form == "html":
+        (packed,) = re.findall(r'id="data">([^<]+)<', path.read_text())
+        data = json.loads(gzip.decompress(base64.b64decode(packed)))["skin_map"]
+        typed = {"um": dict.fromkeys(("value", "low", "high"), 2.0), "site": "", "status": "typed", "source": "typed"}
+        assert data["kinds"][0]["threshold"] == typed
+        assert "WebGLRenderer" not in path.read_text()
+        assert path.stat().st_size < 100_000
     else:
         picture = np.asarray(Image.open(path))
         assert (picture == (255, 106, 19)).all(axis=-1).sum() > 500
@@ -153,7 +163,7 @@ def test_json_has_the_figures_without_the_tables(tmp_path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["encapsulating", "--map", "a.pdf"], "must end with .svg or .png; nearest accepted: 'a.svg'"),
+        (["encapsulating", "--map", "a.pdf"], "must end with .svg, .png or .html; nearest accepted: 'a.svg'"),
         (["encapsulating", "embedded", "--map", "a.svg"], "is a picture of one SPEC"),
         (["encapsulating", "--threshold", "2"], "is for the map: give --map FILE"),
         (["encapsulating", "--map", "a.svg", "--threshold", "0"], "--threshold"),

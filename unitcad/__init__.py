@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from unitcad.catalogue import tissue as tissue
     from unitcad.errors import Refusal as Refusal
     from unitcad.errors import UnitcadError as UnitcadError
+    from unitcad.pipeline.mass import MassProperties as MassProperties
     from unitcad.pipeline.variant import Variant as Variant
     from unitcad.spec import Spec as Spec
     from unitcad.spec.raw import CastingTable as Casting
@@ -57,6 +58,7 @@ __all__ = [
     "Estimate",
     "Fpcb",
     "Layer",
+    "MassProperties",
     "Material",
     "Motor",
     "Moulds",
@@ -88,6 +90,7 @@ _PLACES = {
     "Estimate": "spec.raw:EstimateTable",
     "Fpcb": "spec.raw:FpcbTable",
     "Layer": "spec.raw:LayerTable",
+    "MassProperties": "pipeline.mass:MassProperties",
     "Material": "catalogue:MaterialEntry",
     "Motor": "spec.raw:MotorTable",
     "Moulds": "spec.raw:MouldsTable",

@@ -9,22 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from unitcad import files
 from unitcad.attenuation.curve import contact, in_axes
 from unitcad.attenuation.inputs import Drive, EstimateInput
 from unitcad.attenuation.radial import TERMS, WANTED, RadialTable, radial_table
 from unitcad.catalogue import touch
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_input
-from unitcad.export.field import DECADES, SCALE, Circle, Field, field_picture
+from unitcad.export.field import DECADES, SCALE, Circle, Field
 from unitcad.spec import Spec
 from unitcad.text import join_words, number
 
@@ -38,7 +35,6 @@ UNIT = 1e-8
 """Of the table's integers: share of |u| at the edge."""
 _PITCHES_MM = 120.0
 _MOST_POINTS, _FINEST_MM = 2_000_000, 0.5
-FORMS: Mapping[str, Literal["svg", "png"]] = {".svg": "svg", ".png": "png"}
 ASSUMED = (
     "Bare skin, at middle values of the tissue; no other unit, sheet or circuit is on it. Ranges have the level's 80 % "
     "range, the threshold's own range, and a unit that sticks to the skin or rests on it."
@@ -331,37 +327,6 @@ def map_data(made: SkinMap) -> dict[str, Any]:
         limit = f"its map of {len(made.kinds)} kinds of units has {size // 1000} kB, the most is {LARGEST_KB}"
         raise Refusal("array", made.name, limit)
     return {**msgspec.to_builtins(made), "terms": TERMS, "unit": UNIT, "scale": SCALE, "decades": DECADES}
-
-
-@dataclass(frozen=True)
-class MapFile:
-    """A map that a person asked for: its file, the typed threshold (um) if any, the share for the least pitch.
-
-    Raises `Refusal` for an ending of another form.
-    """
-
-    path: Path
-    threshold_um: float | None
-    share: float
-
-    def __post_init__(self) -> None:
-        form_of(self.path)
-
-    def of_unit(self, spec: Spec, frequency_hz: float | None = None) -> SkinMap:
-        """Write the map of one unit and return it."""
-        return self.write(unit_map(spec, frequency_hz, self.threshold_um, self.share))
-
-    def write(self, made: SkinMap) -> SkinMap:
-        """Write a map with all units on, in one phase, and return it."""
-        files.write(self.path, field_picture(field_of(made), form_of(self.path)))
-        return made
-
-
-def form_of(path: Path) -> Literal["svg", "png"]:
-    """Return the form of a map's file by its ending. Raises `Refusal` for another one."""
-    if path.suffix.lower() not in FORMS:
-        raise Refusal("--map", str(path), "must end with .svg or .png", str(path.with_suffix(".svg")))
-    return FORMS[path.suffix.lower()]
 
 
 def field_of(made: SkinMap, phases_deg: Mapping[str, float] | None = None) -> Field:

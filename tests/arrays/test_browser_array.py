@@ -9,6 +9,8 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_map import array_map
 from unitcad.pipeline.write import build as build_array
 from unitcad.report import write_report
+from unitcad.report.map_file import MapFile
+from unitcad.validation import load
 
 SMALL = ["layout.columns=2", "layout.rows=2", "sheet.strap_slot_mm=[3, 8]", "output.formats=[]"]
 
@@ -116,4 +118,16 @@ def test_units_are_switched_and_turned_by_clicking(browser, mapped):
     page.wait_for_function("() => Number(document.querySelector('input[name=cycle]').value) > 120")
     page.click("button:text-is('Stop')")
     assert seen.overflowing() == []
+    seen.close()
+
+
+def test_the_map_of_one_unit_is_a_page_without_a_list_of_units(browser, tmp_path):
+    path = tmp_path / "map.html"
+    MapFile(path, 2.0, 0.2).of_unit(load("encapsulating"))
+    seen = Visit(browser, path)
+    assert seen.page.locator(".skin-units").count() == 0
+    told = seen.page.locator(".figures").inner_text()
+    assert "33 mm (17 to 39) from its middle. Threshold of touch at 125 Hz: 2 µm (typed)" in told
+    assert "28 mm (17 to 28)" in told
+    assert seen.requests == [path.resolve().as_uri()]
     seen.close()

@@ -109,6 +109,6 @@ def test_the_summary_names_the_pours_whose_bubbles_stay():
     assert all(f"pour {pour.index} ({pour.material})" in last for pour in stay)
     lines = list(casting_summary(asdict(casting("encapsulating"))))
     assert lines[0].startswith("print moulds/moulds.3mf: layers 0.2, first layer 0.2 mm; about ")
-    assert lines[1] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
-    assert lines[2].startswith("out of the mould ")
-    assert len(lines) == 3
+    assert lines[0].endswith(". Mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30.")
+    assert " at the bench. Out of the mould " in lines[1]
+    assert len(lines) == 2

@@ -30,7 +30,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan, Step
 from unitcad.pipeline.manifest import BENCH, PAGE, Manifest
 from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
-from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_page
+from unitcad.report.html_page import MAP, VIEW, compress, drawing, picture, plain_page
 from unitcad.report.read_results import expect, read_sound, read_table
 from unitcad.shape import union
 from unitcad.shape.tree import Body
@@ -168,7 +168,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*figures(*(f"pictures/patch-{side}.png" for side in SIDES)), _worn(array)]),
         *_section("Crosstalk", [_answer(crosstalk), *figures("crosstalk-patch.svg", "crosstalk.svg")]),
-        *_section("Motion of the skin", [MAP_HOST if model and "skin_map" in model else ""]),
+        *_section("Motion of the skin", [MAP if model and "skin_map" in model else ""]),
         *_section("Tools", figures(*(f"pictures/{name}" for name in drawn if not name.startswith("patch-")))),
         *_section("Circuit", figures("circuit.svg")),
         *_section("Casting", list(_casting(folder, table("casting.json")))),
@@ -178,9 +178,6 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         *_section("Files", [_files(manifest)]),
     ]
     return plain_page(manifest["name"], "\n".join(parts), model)
-
-
-MAP_HOST = '<div class="skin-map-host"><p class="absent">A script draws the map of the skin\'s motion.</p></div>'
 
 
 def _model(folder: Path, mapped: bool, warn: Callable[[str], None]) -> dict[str, Any] | None:
@@ -250,7 +247,7 @@ def _chips(manifest: ArrayManifest) -> str:
     findings, check = manifest["mould_checks"], manifest["check"]
     passed = sum(each["ok"] for each in findings)
     good = passed == len(findings) and not check["errors"]
-    chips = [f"{passed} of {len(findings)} mould checks passed"] if findings else ["not checked"]
+    chips = [f"checks: {passed} of {len(findings)}"] if findings else ["checks: not run"]
     chips.append(f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files")
     marked = "".join(f'<li class="chip {"good" if good else "bad"}">{escape(text)}</li>' for text in chips)
     return f'<ul class="chips">{marked}</ul>'

@@ -20,21 +20,21 @@ from unitcad.documents import read_json
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.summary import as_printed, assumed_line, checks_line, to_open
-from unitcad.skin_map import MapFile
+from unitcad.pipeline.summary import as_printed, assumed_line, checks_text, to_open
+from unitcad.report.map_file import MapFile
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
 
 def array_summary(array: Array, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
-    """Yield a line each: units and size, lengths to measure, casting, checks, crosstalk, the page; `given`: as for
+    """Yield a line each: units, size and checks, lengths to measure, casting, crosstalk, the page; `given`: as for
     a unit's summary.
     """
     box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
     made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
     thick = f"{number(array.sheet.thickness_mm, 3)} mm thick{f', {made}' if made else ''}"
-    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {thick}"
+    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {thick}{checks_text(manifest)}"
     for own in sorted(folder.glob("units/*/casting.json")) if manifest["casting"] else ():
         if made := as_printed(read_json(own)):
             yield f"unit {own.parent.name} is {made}"
@@ -44,7 +44,6 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = casting_summary(read_json(folder / "casting.json"))
         yield from (line for line in lines if line not in told)
-    yield from checks_line(manifest)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from read_json(crosstalk)["answer"][:2]

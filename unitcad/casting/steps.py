@@ -142,7 +142,7 @@ def grams_of(procedure: Mapping[str, Any]) -> dict[str, float]:
 
 
 def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line each: pours and times, the mixes, and warnings about a pour.
+    """Yield a line each: what to print and mix, when which part is ready, and warnings about a pour.
 
     `procedure` is a `Procedure` as plain data, as casting.json has it.
     """
@@ -154,13 +154,14 @@ def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
     later = procedure["time_line"][-1]
     more = later["start_min"] + later["bench_min"] + later["wait_min"] - procedure["earliest_finish_min"]
     mixed = f", with {mixes} more mix{'es' if mixes > 1 else ''}," if mixes else ""
-    then = f"; {procedure['last'].lower()}{mixed} {duration(more)} later" if procedure["assembly"] else ""
+    then = f" {procedure['last']}{mixed} {duration(more)} after that." if procedure["assembly"] else ""
     printing = procedure["printing"]
     time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
     layers = f"layers {number(printing['layer_mm'], 3)}, first layer {number(printing['first_layer_mm'], 3)} mm"
-    yield f"print {join_words(printing['plates'])}: {layers}; about {time}, at most {volume} cm3 of {printing['of']}"
-    yield "mix " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams_of(procedure).items())
-    yield f"out of the mould {total} after the print: {count}, {bench} at the bench{then}"
+    mix = ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams_of(procedure).items())
+    filament = f"about {time}, at most {volume} cm3 of {printing['of']}"
+    yield f"print {join_words(printing['plates'])}: {layers}; {filament}. Mix {mix}."
+    yield f"{count}, {bench} at the bench. Out of the mould {total} after the print.{then}"
     yield from (f"warning: {line}" for line in pour_warnings(pours))
 
 

@@ -84,7 +84,7 @@ def estimate(
     ] = None,
     map_file: Annotated[
         Path | None,
-        typer.Option("--map", metavar="FILE", help="Map of the skin's motion, .svg or .png. Default: none."),
+        typer.Option("--map", metavar="FILE", help="Map of the skin's motion: .svg, .png or .html. Default: none."),
     ] = None,
     threshold: Annotated[
         float | None,
@@ -118,7 +118,7 @@ def estimate(
     specs = [confirm_known(name) for name in specs]
     wanted_map = None
     if map_file is not None:
-        from unitcad.skin_map import MapFile  # loads Pillow
+        from unitcad.report.map_file import MapFile  # loads Pillow
 
         if len(specs) > 1:
             raise Refusal("--map", str(map_file), "is a picture of one SPEC; give one")

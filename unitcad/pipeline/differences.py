@@ -102,7 +102,7 @@ def _outcome(one: Built) -> Iterator[tuple[str, str]]:
         yield "at the bench", duration(procedure["bench_min"])
     if checks := manifest["mould_checks"]:
         failed = sorted({check["code"] for check in checks if not check["ok"]})
-        yield "mould checks", " ".join(failed) or "all passed"
+        yield "failed checks", " ".join(failed) or "none"
     if level := manifest["estimate"]:
         low, high = level["low"], level["high"]
         ends = "" if low is None or high is None else f" ({spread(low, high).removesuffix(' %')})"

@@ -19,11 +19,13 @@ from unitcad.text import join_words, number
 
 
 def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
-    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. Skipped outputs have no line.
+    """Yield a line each: size, mass and checks; lengths to measure; what to print and mix; when it is ready; the level.
+
+    The last line has the page to open. Skipped outputs have no line.
 
     A length that is `given`, by its path, counts as measured.
     """
-    columns = row(spec, manifest)
+    columns, checked = row(spec, manifest), checks_text(manifest)
     parts = [part for part in manifest["parts"] if part["role"] == "unit"]
     casting = read_json(folder / "casting.json") if manifest["casting"] else None
     if parts:
@@ -38,11 +40,12 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         made = as_printed(casting) if casting else ""
         if made and circuit:
             made += f", {high} with its circuit"
-        yield f"{each}{across} mm across, {made or f'{high} mm high{circuit}'}{silicone}"
+        yield f"{each}{across} mm across, {made or f'{high} mm high{circuit}'}{silicone}{checked}"
+    elif checked:
+        yield checked.removeprefix("; ")
     yield from assumed_line(spec, given)
     if casting:
         yield from casting_summary(casting)
-    yield from checks_line(manifest)
     if level := manifest["estimate"]:
         yield level["line"]
     yield from to_open(folder)
@@ -74,20 +77,23 @@ def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[
         yield f"measure first; assumed: {lengths}{yours}"
 
 
-def checks_line(manifest: Manifest) -> Iterator[str]:
-    """Yield a line of the mould checks and of the faults in files, if they were checked."""
+def checks_text(manifest: Manifest) -> str:
+    """Return "; checks: N of M" with the faults of files if there are any; "" for a result that was not checked."""
     checks, check = manifest["mould_checks"], manifest["check"]
-    if checks:
-        passed = sum(entry["ok"] for entry in checks)
-        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
-        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+    if not checks:
+        return ""
+    passed = sum(entry["ok"] for entry in checks)
+    faults = [counted(check[f"{kind}s"], kind) for kind in ("error", "warning") if check[f"{kind}s"]]
+    files = f", {join_words(faults)} in the files" if faults else ""
+    return f"; checks: {passed} of {len(checks)}{files}"
 
 
 def to_open(folder: Path) -> Iterator[str]:
-    """Yield a line for each page of a result's folder."""
-    for name, use in ((BENCH, " to cast"), (PAGE, "")):
-        if (folder / name).is_file():
-            yield f"open {shlex.quote(str(folder / name))}{use}"
+    """Yield a line for the pages of a result's folder."""
+    there = [name for name in (BENCH, PAGE) if (folder / name).is_file()]
+    if there:
+        first = shlex.quote(str(folder / there[0]))
+        yield f"open {first} to cast; {PAGE} is next to it" if len(there) > 1 else f"open {first}"
 
 
 def _height(parts: list[PartRecord]) -> str:

@@ -158,27 +158,26 @@ def _hash(text: str) -> str:
 _STYLES = ("app/page.css", "app/print.css")
 
 
-_PROGRAMS = (
-    "vendor/three.min.js",
-    *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "skinmap", "array")),
-)
+_MAP = ("app/dom.js", "app/glb.js", "app/skinmap.js", "app/marked.js")
+_VIEWER = ("vendor/three.min.js", *_MAP[:2], "app/viewer.js", "app/controls.js", *_MAP[2:])
+MAP = '<div class="skin-map-host"><p class="absent">A script draws the map of the skin\'s motion.</p></div>'
 VIEW = '<div class="stage-host"><p class="absent">A script draws the 3D view.</p></div>'
 
 
 def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> str:
     """Return the HTML of a page that contacts nothing; `body` is markup, whose texts are escaped already.
 
-    With a `model` it contains the programs of the 3D view, which draw it in the place of VIEW.
+    With a `model` it contains the programs that draw it: a 3D view in the place of VIEW, and the map of the skin's
+    motion, the model's `skin_map`, in that of MAP.
     """
     sheets, markup = [asset(name) for name in _STYLES], [f'<main id="page">{body}</main>']
     if model is None:
         return document(title, sheets, markup)
-    licence = html.escape(asset("vendor/three.LICENSE.txt"), quote=False)
-    markup += [
-        f'<script type="text/plain" id="data">{pack(model)}</script>',
-        f'<script type="text/plain" id="licences">{licence}</script>',
-    ]
-    return document(title, sheets, markup, [asset(name) for name in _PROGRAMS])
+    markup.append(f'<script type="text/plain" id="data">{pack(model)}</script>')
+    if VIEW in body:
+        licence = html.escape(asset("vendor/three.LICENSE.txt"), quote=False)
+        markup.append(f'<script type="text/plain" id="licences">{licence}</script>')
+    return document(title, sheets, markup, [asset(name) for name in (_VIEWER if VIEW in body else _MAP)])
 
 
 def drawing(svg: str, alt: str, narrow: str = "") -> str:

@@ -23,10 +23,10 @@
     const checks = manifest.mould_checks || [];
     const failed = checks.filter((check) => !check.ok).length;
     const errors = manifest.check ? manifest.check.errors : 0;
-    if (!checks.length) return { state: "unknown", text: "mould checks not run" };
-    if (failed) return { state: "bad", text: `${failed} of ${checks.length} mould checks failed` };
+    if (!checks.length) return { state: "unknown", text: "checks: not run" };
+    if (failed) return { state: "bad", text: `checks: ${checks.length - failed} of ${checks.length}` };
     if (errors) return { state: "bad", text: `${errors} errors in files` };
-    return { state: "good", text: `${checks.length} mould checks passed` };
+    return { state: "good", text: `checks: ${checks.length} of ${checks.length}` };
   }
 
   function sectionDrawing(variant) {

@@ -191,7 +191,7 @@
       if (!kind.edge_um) lines.push(`${of}No felt radius, since there is no level at the edge: ${kind.no_edge}.`);
       else if (!um) lines.push(`${of}No felt radius: ${kind.no_threshold}. Type a threshold.`);
       else {
-        const own = shown.typed ? "typed" : `${kind.threshold.site}, level ${kind.threshold.status}`;
+        const own = shown.typed || !kind.threshold.site ? "typed" : `${kind.threshold.site}, level ${kind.threshold.status}`;
         const felt = shown.typed ? length(lastAbove(map, kind, um / kind.edge_um.value)) : length(kind.felt_mm.value, kind.felt_mm);
         lines.push(`${of}Felt radius of a unit: ${felt} from its middle. Threshold of touch at ${number(kind.frequency_hz)} Hz: ${number(um, 2)} µm (${own}).`);
       }

@@ -102,7 +102,7 @@
       const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.line : (estimate.lines || [])[0];
       const failed = (moulds.checks || []).filter((check) => !check.ok).length;
       const level = estimate.estimate && estimate.estimate.answer;
-      const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
+      const more = moulds.checks ? [["checks", moulds.checks.length - failed, `of ${moulds.checks.length}`]] : [];
       return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, level, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
 
@@ -319,7 +319,7 @@
         clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view shows only the ${noun()}.`));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
-      } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.mould_checks.length} mould checks failed` : `${manifest.mould_checks.length} mould checks passed`);
+      } else said(failed.length ? "bad" : "good", `checks: ${manifest.mould_checks.length - failed.length} of ${manifest.mould_checks.length}`);
     }
 
     function toForm() { page.querySelector("#spec").focus({ preventScroll: true }); }
