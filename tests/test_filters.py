@@ -182,3 +182,27 @@ def test_the_motors_are_those_of_a_shop():
         assert (each.test_mass_g is None) or each.acceleration_g
         if each.rpm and each.frequency_hz:  # a motor's force turns once a revolution
             assert float(each.frequency_hz) == pytest.approx(float(each.rpm) / 60, rel=0.01)
+
+
+def test_list_shows_what_a_cupboard_holds(tmp_path):
+    file = tmp_path / "cupboard.toml"
+    file.write_text(
+        '[at_hand]\nmaterials = ["ecoflex-00-10", "our-blend"]\n[materials.our-blend]\nlike = "dragon-skin-30"\n'
+        '[printers.mine]\nlike = "fdm-0.4"\n'
+    )
+
+    def names(*words):
+        done = unitcad("list", *words, "--cupboard", file, "--json")
+        assert done.returncode == 0, done.stderr
+        return set(json.loads(done.stdout)[words[0]])
+
+    assert names("materials") == {"ecoflex-00-10", "our-blend"}
+    assert names("materials", "--soft", "..60kPa") == {"ecoflex-00-10"}
+    assert names("printers") > {"mine", "sla"}
+    assert len(names("motors")) == 24
+    shown = unitcad("list", "materials", "--cupboard", file).stdout
+    assert "our-blend\n" in shown
+    assert unitcad("list", "rules", "--cupboard", file).returncode == 2
+    refused = unitcad("list", "materials", "--cupboard", tmp_path / "none.toml")
+    assert refused.returncode == 2
+    assert "no such file" in refused.stderr

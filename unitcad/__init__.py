@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from unitcad.api.check_call import check as check
     from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
     from unitcad.api.estimate_call import estimate as estimate
+    from unitcad.api.variant import Variant as Variant
     from unitcad.catalogue import MaterialEntry as Material
     from unitcad.catalogue import materials as materials
     from unitcad.catalogue import motors as motors
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from unitcad.catalogue import tissue as tissue
     from unitcad.errors import Refusal as Refusal
     from unitcad.errors import UnitcadError as UnitcadError
-    from unitcad.pipeline.variant import Variant as Variant
+    from unitcad.pipeline.mass import MassProperties as MassProperties
     from unitcad.spec import Spec as Spec
     from unitcad.spec.raw import CastingTable as Casting
     from unitcad.spec.raw import EstimateTable as Estimate
@@ -57,6 +58,7 @@ __all__ = [
     "Estimate",
     "Fpcb",
     "Layer",
+    "MassProperties",
     "Material",
     "Motor",
     "Moulds",
@@ -88,6 +90,7 @@ _PLACES = {
     "Estimate": "spec.raw:EstimateTable",
     "Fpcb": "spec.raw:FpcbTable",
     "Layer": "spec.raw:LayerTable",
+    "MassProperties": "pipeline.mass:MassProperties",
     "Material": "catalogue:MaterialEntry",
     "Motor": "spec.raw:MotorTable",
     "Moulds": "spec.raw:MouldsTable",
@@ -95,7 +98,7 @@ _PLACES = {
     "Refusal": "errors:Refusal",
     "Spec": "spec:Spec",
     "UnitcadError": "errors:UnitcadError",
-    "Variant": "pipeline.variant:Variant",
+    "Variant": "api.variant:Variant",
     "Wires": "spec.raw:WiresTable",
     "attenuation": "attenuation",
     "build": "api.build_call:build",

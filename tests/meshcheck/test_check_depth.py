@@ -121,3 +121,10 @@ def test_a_file_of_faces_without_area_only_has_no_volume(judge):
 def test_the_message_says_the_depth(judge):
     report = judge(stl(np.concatenate([box(), box((6, 6, 10), (2, 2, 9.995))])))
     assert finding(report, "G001").message.endswith("that cross, 0.005 mm deep at most")
+
+
+@pytest.mark.parametrize("times", [2, 3000])
+def test_triangles_that_lie_on_each_other_are_judged_once(times, judge):
+    """One polygon round the same four corners many times: Clipper splits each edge at each other one for minutes."""
+    polygon = f"v 0 0 0\nv 0 0 9\nv 0 9 0\nv 0 9 9\nf {'1 2 3 4 ' * times}\n"
+    assert severities(judge(polygon.encode(), "part.obj"))["G009"] == "error"

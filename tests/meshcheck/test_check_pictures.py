@@ -10,6 +10,7 @@ from shapes import box, stl
 from test_check_command import run
 
 from unitcad.export import finding_pictures
+from unitcad.meshcheck import Options, check_bytes
 
 CROSSED = np.concatenate([box(), box((4, 4, 4), (8, 3, 3))])
 CAVITY = np.concatenate([box((20, 20, 20)), box((5, 5, 5), (7, 7, 7))[:, ::-1]])
@@ -106,3 +107,15 @@ def test_a_folder_that_cannot_be_written_is_one_error(tmp_path):
     for jobs in ("1", "2"):
         result = run("a.stl", "a.stl", "--pictures", "p", "--jobs", jobs, cwd=tmp_path)
         assert (result.returncode, len(result.stderr.splitlines())) == (2, 1)
+
+
+def test_faces_on_each_other_are_drawn_once():
+    """A file with 40,000 copies of a face took minutes: each was drawn pixel by pixel."""
+    often = np.concatenate([box(), *[box()[4:5]] * 40_000])
+    once, many = (
+        finding_pictures._scene(check_bytes(stl(faces), "a.stl", Options(draw=True)).meshes[0])
+        for faces in (CROSSED, often)
+    )
+    assert once.drawn.tolist() == [*range(len(CROSSED))]
+    assert (many.faces == once.faces[:12]).all()
+    assert many.drawn.tolist() == [*range(12), *[4] * 40_000]

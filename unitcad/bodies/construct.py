@@ -36,6 +36,8 @@ MOST_DRAWN = 8
 MOST_STRETCHED = 100.0
 """Strain of a peel up to which a way is taken, percent: what the stiffest shipped silicones bear with a margin of 3."""
 _AS_DRAWN = "as drawn, a cup that lifts off: "
+_OF_THE_UNIT = "unit: "
+"""Start of the place of a finding about the unit itself, which stays whichever mould is taken."""
 _OF_THE_BODY = ("design", "moulds.pour")
 """Fields of refusals for which another way may help."""
 SAID = 4
@@ -55,7 +57,7 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     tried = [_AS_DRAWN]
     if isinstance(first, Tooling):
         failed = _failed(spec, planned(first))
-        if not failed:
+        if not failed or any(finding.where.startswith(_OF_THE_UNIT) for finding in failed):
             return first
         tried[0] += _said(failed[0])
     elif first.field in _OF_THE_BODY:
@@ -138,8 +140,10 @@ def _drawn(spec: Spec, body: Shape) -> Iterator[tuple[Way, Mould | str]]:
 def _failed(spec: Spec, plan: Plan) -> list[MouldFinding]:
     """Return the findings against a plan: of the checks of geometry, since variants in silicone share their tools."""
     moulds = MouldSet(spec, origin=replace(origin_of(spec), plan=lambda: plan))
+    if failed := [finding for finding in check_geometry(moulds) if not finding.ok]:
+        return failed
     wide = (at_most("C310", strain.where, strain.percent, MOST_STRETCHED, "%") for strain in strains(moulds))
-    failed = [finding for finding in (*check_geometry(moulds), *wide) if not finding.ok]
+    failed = [finding for finding in wide if not finding.ok]
     return failed or [finding for piece in plan.pieces if (finding := _too_thin(moulds, piece))]
 
 

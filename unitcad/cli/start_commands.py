@@ -26,7 +26,7 @@ from unitcad.rooms import file_kinds, load
 from unitcad.spec import convert
 from unitcad.text import some
 from unitcad.validation import default_template
-from unitcad.validation.cupboard import add_entry, read_cupboard
+from unitcad.validation.cupboard import add_entry, held, read_cupboard
 from unitcad.validation.load import shipped_of
 from unitcad.validation.plain_data import changes_of
 from unitcad.validation.starter import comment_template
@@ -134,6 +134,10 @@ def list_(
             metavar="KEY=RANGE", help=f"Entries by any key, such as kind=lra or density_g_cm3=..1.1. {_RANGE}"
         ),
     ] = None,
+    cupboard: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Only entries of a file of what you own, and its own ones. Default: all."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """List the shipped entries, each value with its source and status.
@@ -147,20 +151,23 @@ def list_(
         if not equals:
             raise Refusal("--where", text, "is KEY=RANGE, such as kind=lra or density_g_cm3=..1.1")
         wanted[key.strip()] = value.strip()
-    kinds = _kinds()
+    kinds, filtered = _kinds(), bool(wanted or cupboard)
     if not kind:
-        if wanted:
+        if filtered:
             raise Refusal("KIND", None, "is required with a filter", "materials")
         print_json({"kinds": list(kinds)}) if as_json else typer.echo("\n".join(kinds))
         return
     if kind not in kinds:
         raise unknown_name("KIND", kind, kinds)
     entries, lacking = kinds[kind](), dict[str, list[str]]()
-    if wanted:
-        if kind not in _ENTRIES:
-            raise Refusal("KIND", kind, f"has no values to filter by; {', '.join(_ENTRIES)} have", "materials")
-        kept, lacking = keep(_ENTRIES[kind](), wanted)
-        entries = _values(kept)
+    known = dict[str, Any]()
+    if kind in _ENTRIES:
+        known = held(cupboard)[kind] if cupboard else _ENTRIES[kind]()
+    elif filtered:
+        raise Refusal("KIND", kind, f"has no values to filter by; {', '.join(_ENTRIES)} have", "materials")
+    if filtered:
+        known, lacking = keep(known, wanted)
+        entries = _values(known)
     if as_json:
         print_json({kind: entries, **({"without_a_value": lacking} if wanted else {})})
         return
@@ -173,12 +180,12 @@ def list_(
             how = f"; {value['method']}" if "method" in value else ""
             bounds = _bounds(value)
             typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
-        if kind == "materials" and (note := moduli_note(catalogue.materials()[name])):
+        if kind == "materials" and (note := moduli_note(known[name])):
             typer.echo(f"  moduli: {note}")
     for key, names in lacking.items():
         option = f"--{key.replace('_', '-')}" if key in SHORT else key
         typer.echo(f"left out, without a value for {option}: {some(names)}", err=True)
-    if wanted and not entries:
+    if filtered and not entries:
         typer.echo(f"none of the {kind} meets it", err=True)
 
 

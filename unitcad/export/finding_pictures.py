@@ -45,10 +45,14 @@ _MOST = 3000  # places of a finding that are coloured
 
 @dataclass(frozen=True)
 class Scene:
-    """A mesh as it is drawn: welded vertices (n, 3) mm, faces (m, 3), the diagonal of its box in mm."""
+    """A mesh as it is drawn: welded vertices (n, 3) mm, faces (k, 3), the diagonal of its box in mm.
+
+    Faces with the same corners, the same way round, are drawn once: `drawn` (m,) is the face drawn for each of the mesh.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
+    drawn: np.ndarray
     size: float
 
 
@@ -92,7 +96,7 @@ def draw(report: FileReport, finding: Finding, scenes: Sequence[Scene | None]) -
     across = float(np.linalg.norm(np.ptp(corners, axis=0))) if len(corners) else 0.0
     pair = len(places[0].faces) == 2
     reach = (0.15 if pair else float(np.clip(0.9 * across / scene.size, 0.08, 0.3))) * scene.size
-    towards, cut = _direction(scene, first[:0] if pair else first, middle, reach)
+    towards, cut = _direction(scene, scene.drawn[first[:0] if pair else first], middle, reach)
     surface = _painted(scene, places, COLOURS[finding.severity], CUT if np.isfinite(cut) else INSIDE)
     name = Name(f"{finding.code} {rules()[finding.code].title}", tuple(middle.tolist()), ring=True)
     whole, near = raster.aim(towards, scene.vertices, SIZE), raster.aim(towards, middle[None], SIZE, reach)
@@ -148,10 +152,11 @@ def _painted(scene: Scene, places: Sequence[Location], colour: Colour, inside: C
     palette = np.array([PART, np.add(colour, PART) / 2, SECOND, colour])
     kind = np.zeros(len(scene.faces), int)
     for place in places[1:]:
-        kind[_region(place)] = 1
+        kind[scene.drawn[_region(place)]] = 1
     for place in places[:1]:
-        kind[_region(place)[1:]] = 2 if len(place.faces) == 2 else 3
-        kind[_region(place)[:1]] = 3
+        region = scene.drawn[_region(place)]
+        kind[region[1:]] = 2 if len(place.faces) == 2 else 3
+        kind[region[:1]] = 3
     order = np.argsort(kind, kind="stable")  # marked faces come last: they hide other faces in their place
     behind = palette * 0.9
     behind[0] = inside
@@ -163,7 +168,12 @@ def _scene(mesh: Mesh) -> Scene | None:
         return None
     vertices, faces = weld_exact(mesh.vertices[mesh.faces])
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    return Scene(vertices, faces, size) if size > 0 else None
+    if size <= 0:
+        return None
+    turned = np.take_along_axis(faces, (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    _, first, alike = np.unique(turned, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # the faces stay in the order of the file
+    return Scene(vertices, faces[first[order]], np.argsort(order)[alike.reshape(-1)], size)
 
 
 def _direction(scene: Scene, faces: np.ndarray, point: np.ndarray, reach: float) -> tuple[Colour, float]:

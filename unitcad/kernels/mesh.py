@@ -143,13 +143,36 @@ def _is_thick(piece: Manifold, least: float) -> bool:
     volume = float(piece.volume())
     if volume <= least**3 or 2 * volume > least * float(piece.surface_area()):
         return volume > least**3
-    left = piece
+    return _has_rest(piece, np.reshape(bounds(piece), (2, 3)), least)
+
+
+def _has_rest(solid: Manifold, window: np.ndarray, least: float) -> bool:
+    """Tell whether a rest remains in a window, its corners (2, 3) mm, between copies moved apart by `least` in all ways.
+
+    A window with many faces is halved: intersections of many nearly parallel films have millions of faces.
+    """
+    left = solid ^ _box(window)
+    if left.is_empty():
+        return False
+    window = np.reshape(bounds(left), (2, 3))
+    solid ^= _box(window + np.array([[-least], [least]]))
+    size = np.ptp(window, axis=0)
+    longest = int(np.argmax(size))
+    if solid.num_tri() > _MANY and size[longest] > 4 * least:
+        halves = np.stack([window, window])
+        halves[0, 1, longest] = halves[1, 0, longest] = window[:, longest].mean()
+        return any(_has_rest(solid, half, least) for half in halves)
     for way in _WAYS:
         x, y, z = (least / 2 * way).tolist()
-        left = left ^ piece.translate((x, y, z)) ^ piece.translate((-x, -y, -z))
+        left = left ^ solid.translate((x, y, z)) ^ solid.translate((-x, -y, -z))
         if left.is_empty():
             return False
     return True
+
+
+def _box(corners: np.ndarray) -> Manifold:
+    """Return the box between two corners (2, 3), mm."""
+    return Manifold.cube((corners[1] - corners[0]).tolist()).translate(corners[0].tolist())
 
 
 def as_trimesh(solid: Manifold) -> Any:
@@ -168,6 +191,8 @@ def bounds(solid: Manifold) -> tuple[float, ...]:
 _WAYS = np.array([way for way in product((-1, 0, 1), repeat=3) if way > (0, 0, 0)], dtype=float)
 _WAYS /= np.linalg.norm(_WAYS, axis=1)[:, None]
 """Directions from a cube's middle to its faces, edges and corners, one of each two that are opposite."""
+_MANY = 30
+"""Faces above which a window of a film is halved."""
 _FEW = 20
 """Shells up to which `decompose` is the quicker way."""
 _PROBE = 1e-4

@@ -1,9 +1,12 @@
-"""Bodies as objects of build123d and CadQuery, as assembled (mm): one child a body, with its name and colour."""
+"""Groups of bodies as objects of build123d and CadQuery, in place (mm): a child a group, in it one a body.
+
+Every child has its name, every body its colour.
+"""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from typing import Any
 
@@ -13,27 +16,42 @@ from unitcad.kernels import occt
 from unitcad.kernels.ocp import loading
 from unitcad.shape.tree import Body
 
+Groups = Mapping[str, Sequence[Body]]
+"""Bodies by the name of their group."""
 
-def build123d_compound(bodies: Sequence[Body]) -> Any:
+
+def build123d_compound(name: str, groups: Groups) -> Any:
     """Return an assembly as a build123d Compound. Raises Missing without build123d."""
     with loading("build123d"):
         import build123d as b3d
         from build123d.topology import Shape
-    children = [Shape.cast(solid) for solid in occt.solids(body.shape for body in bodies)]
-    for child, body in zip(children, bodies, strict=True):
-        child.label = body.name
-        child.color = b3d.Color(*body.colour)
-    return b3d.Compound(label="unitcad", children=children)
+    solids = _solids(groups)
+    children = []
+    for group, bodies in groups.items():
+        parts = [Shape.cast(next(solids)) for _ in bodies]
+        for part, body in zip(parts, bodies, strict=True):
+            part.label = body.name
+            part.color = b3d.Color(*body.colour)
+        children.append(b3d.Compound(label=group, children=parts))
+    return b3d.Compound(label=name, children=children)
 
 
-def cadquery_assembly(bodies: Sequence[Body]) -> Any:
+def cadquery_assembly(name: str, groups: Groups) -> Any:
     """Return an assembly as a CadQuery Assembly. Raises Missing without CadQuery."""
     with loading("cadquery"):
         import cadquery as cq
-    whole = cq.Assembly(name="unitcad")
-    for body, solid in zip(bodies, occt.solids(body.shape for body in bodies), strict=True):
-        whole.add(cq.Shape.cast(solid), name=body.name, color=cq.Color(*body.colour))
+    solids, whole = _solids(groups), cq.Assembly(name=name)
+    for group, bodies in groups.items():
+        part = cq.Assembly(name=group)
+        for body in bodies:
+            part.add(cq.Shape.cast(next(solids)), name=body.name, color=cq.Color(*body.colour))
+        whole.add(part, name=group)
     return whole
+
+
+def _solids(groups: Groups) -> Any:
+    """Yield the solid of each body, group by group."""
+    return iter(occt.solids(body.shape for bodies in groups.values() for body in bodies))
 
 
 def show(assembly: Any) -> None:
@@ -48,6 +66,7 @@ def show(assembly: Any) -> None:
     elif find_spec("yacv_server"):
         import yacv_server
 
-        yacv_server.show(*assembly.children, names=[child.label for child in assembly.children])
+        leaves = [leaf for group in assembly.children for leaf in group.children]
+        yacv_server.show(*leaves, names=[leaf.label for leaf in leaves])
     else:
         raise UnitcadError(f"no viewer is installed: {shlex.join([*pip_install(), 'ocp-vscode'])} (or yacv-server)")

@@ -19,36 +19,40 @@ from unitcad.documents import parse_toml
 from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
 from unitcad.json_text import parse_message
 from unitcad.serve import unit_answers
+from unitcad.serve.cupboard_choices import offered, with_entries
 from unitcad.serve.form import edited
-from unitcad.serve.messages import Answer, Ask, Fault, Trusted
+from unitcad.serve.messages import ALL, Answer, Ask, Fault, Held, Trusted
 from unitcad.serve.remedies import add_remedies
 from unitcad.validation import compound_kind
 
 
-def respond(message: bytes, trusted: bytes) -> bytes:
-    """Return the answer to an `Ask`, both as JSON; `trusted` is a `Trusted` as JSON."""
+def respond(message: bytes, trusted: bytes, held: bytes = b"{}") -> bytes:
+    """Return the answer to an `Ask`, both as JSON; `trusted` is a `Trusted` as JSON, `held` a `Held`."""
     begun = time.process_time()
     ask = parse_message(message, Ask)
-    answer = answered(ask, parse_message(trusted, Trusted))
+    answer = answered(ask, parse_message(trusted, Trusted), parse_message(held, Held))
     answer.processor_ms = round(1e3 * (time.process_time() - begun), 1)
     return msgspec.json.encode(answer)
 
 
-def answered(ask: Ask, trusted: Trusted) -> Answer:
+def answered(ask: Ask, trusted: Trusted, held: Held = ALL) -> Answer:
     """Return the answer to a question. A fault of the text or of a value is in it; nothing is raised for one."""
     try:
-        return _answered(ask, trusted)
+        return _answered(ask, trusted, held)
     except RecursionError:
         return Answer(text=ask.text, faults=[Fault("the text: nests too deeply")])
 
 
-def _answered(ask: Ask, trusted: Trusted) -> Answer:
+def _answered(ask: Ask, trusted: Trusted, held: Held) -> Answer:
     try:
         text = edited(ask.text, ask.edits)
     except UnitcadError as error:
         return Answer(text=ask.text, faults=[_fault(error)])
     try:
         data = parse_toml(text, "the text")
+        if not compound_kind(data):
+            text = with_entries(text, data, held)
+            data = parse_toml(text, "the text")
     except UnitcadError as error:
         place = re.match(r"the text:(\d+):", str(error))  # the line that tomllib's message names
         fault = _fault(error)
@@ -71,7 +75,7 @@ def _answered(ask: Ask, trusted: Trusted) -> Answer:
     except UnitcadError as error:
         answer.faults = [_fault(error)]
     if ask.what == "unit":
-        answer.groups = kind.form(data, subject)
+        answer.groups = offered(kind.form(data, subject), held, unit=kind is unit_answers)
         answer.spec = kind.as_data(subject) if subject else None
     return answer
 

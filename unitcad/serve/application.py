@@ -23,7 +23,7 @@ from unitcad.json_text import parse_message
 from unitcad.report.page import page_data
 from unitcad.serve.jobs import Jobs, build_folder, sweep_folder
 from unitcad.serve.live_page import HEADER_POLICY, live_page
-from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
+from unitcad.serve.messages import ALL, Ask, Build, Cancel, Fault, Held, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
 from unitcad.serve.request_guard import AccessKeys, RequestGuard
 from unitcad.text import toml
@@ -63,7 +63,7 @@ class Live:
 
     `text` is the first text, `name` its file's, `trusted` the files that texts may name, `starts` the texts to start
     from. `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that the
-    page lists.
+    page lists. `held`: the entries that the pickers offer.
     """
 
     text: str
@@ -75,11 +75,12 @@ class Live:
     token: str
     port: int
     batch: Path | None = None
+    held: Held = ALL
 
     def __post_init__(self) -> None:
         self.cookie = f"unitcad-{self.port}"
         self.keys = AccessKeys(self.token)
-        self.questions = Questions(self.text, self.trusted)
+        self.questions = Questions(self.text, self.trusted, self.held)
         self.jobs = Jobs(self.out, self.keys)
         self._saving = asyncio.Lock()
 

@@ -69,6 +69,8 @@ _USE = {
 }
 """Ranges of use, which sliders have in place of the possible range; a value beyond widens its own."""
 _UNITS = ("mm", "hz", "um", "g", "c", "kpa")
+OF_SPEC = "of this spec"
+"""Remark on an entry that the spec has itself."""
 _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 
@@ -200,7 +202,7 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
     }
 
     def names(name: str) -> list[tuple[str, str]]:
-        return [(each, "of this spec") for each in own.get(name, {})]
+        return [(each, OF_SPEC) for each in own.get(name, {})]
 
     return {
         "design": [(name, design.about) for name, design in shipped().items()],

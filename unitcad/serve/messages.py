@@ -104,6 +104,17 @@ class Fault(Struct, frozen=True, omit_defaults=True):
     rename: tuple[str, Any] | None = None
 
 
+class Held(Struct, frozen=True):
+    """The contents of a cupboard: names by kind, None without one; tables of its own entries by kind and name."""
+
+    names: dict[str, list[str]] | None = None
+    own: dict[str, dict[str, dict[str, Any]]] = {}
+
+
+ALL = Held()
+"""Without a cupboard: everything is offered."""
+
+
 class Field(Struct, frozen=True, omit_defaults=True):
     """A control of the form.
 

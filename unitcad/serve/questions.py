@@ -7,7 +7,7 @@ import asyncio
 import msgspec
 
 from unitcad.errors import UnitcadError
-from unitcad.serve.messages import Ask, Trusted, What
+from unitcad.serve.messages import ALL, Ask, Held, Trusted, What
 from unitcad.workers import Pool, TimedOut, WorkerEnded
 
 ANSWER_S: dict[What, float] = {"unit": 20.0, "moulds": 60.0, "estimate": 30.0}
@@ -35,8 +35,8 @@ class Superseded(Exception):
 class Questions:
     """The workers, one for each kind of question, so that its parts stay in its memory."""
 
-    def __init__(self, text: str, trusted: Trusted) -> None:
-        self.trusted = msgspec.json.encode(trusted)
+    def __init__(self, text: str, trusted: Trusted, held: Held = ALL) -> None:
+        self.trusted, self.held = msgspec.json.encode(trusted), msgspec.json.encode(held)
         self._text = text
         self._pools: dict[What, Pool] = {}
         self.turns = {what: asyncio.Lock() for what in ANSWER_S}
@@ -104,5 +104,5 @@ class Questions:
             del self._newest[next(iter(self._newest))]
         return overtaken
 
-    def _parts(self, ask: Ask) -> tuple[str, bytes, bytes]:
-        return "unitcad.serve.answers:respond", msgspec.json.encode(ask), self.trusted
+    def _parts(self, ask: Ask) -> tuple[str, bytes, bytes, bytes]:
+        return "unitcad.serve.answers:respond", msgspec.json.encode(ask), self.trusted, self.held

@@ -29,6 +29,10 @@ def serve(
         int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0 takes a free one.")
     ] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
+    cupboard: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="File of what you own: the pickers offer only its entries. Default: all."),
+    ] = None,
     code: AllowCode = False,
 ) -> None:
     """Open a live page of a spec in the browser.
@@ -46,4 +50,4 @@ def serve(
         from unitcad.serve.server import serve as run
     except ImportError as error:
         raise missing_extra("serve", f"the live page needs {error.name}") from None
-    run(source, port=port, out=out, code=code, ready=ready)
+    run(source, port=port, out=out, code=code, cupboard=cupboard, ready=ready)

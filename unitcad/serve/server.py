@@ -21,8 +21,9 @@ from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import expect_none_but
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, application
+from unitcad.serve.cupboard_choices import held_in
 from unitcad.serve.jobs import RESULTS
-from unitcad.serve.messages import Source
+from unitcad.serve.messages import ALL, Source
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
 from unitcad.validation import compound_kind, custom_templates, default_template, every_template
@@ -40,15 +41,18 @@ def serve(
     port: int = 0,
     out: Path = DEFAULT_OUT,
     code: bool = False,
+    cupboard: Path | None = None,
     ready: Callable[[str], None] = lambda address: None,
 ) -> None:
     """Serve the live page of a spec on the loopback until it is interrupted; `ready` takes its address with the token.
 
     `source` is a file of a spec or an array, a template's name, a result's folder, or a batch's, whose rows
-    open live; None: the default template. `port` 0: any that is free.
+    open live; None: the default template. `port` 0: any that is free. `cupboard`: a file of what a person has, whose
+    entries the pickers offer.
     Raises Refusal for a spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
     token = secrets.token_urlsafe(24)
+    held = held_in(cupboard) if cupboard else ALL
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
         out = batch.resolve().with_name(f"{batch.resolve().name}-live")
@@ -75,7 +79,7 @@ def serve(
         bound = listening.getsockname()[1]
         live = Live(
             text, path.name if own else f"{path.stem}.toml", folder, out,
-            [source for source in trusted if source.named], starts, token, bound, batch,
+            [source for source in trusted if source.named], starts, token, bound, batch, held,
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
         config = uvicorn.Config(

@@ -63,6 +63,8 @@ class Cupboard(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 def cupboard_of(data: Mapping[str, Any]) -> Cupboard:
     """Return the cupboard of a file's data. Raises Refusal for the first fault, and for an unknown name."""
+    if not data:
+        raise Refusal("at_hand", None, "is required, or an entry of your own")
     cupboard = convert(data, Cupboard)
     check_at_hand(cupboard.at_hand, cupboard.materials, cupboard.motors, cupboard.printers)
     if cupboard.at_hand.cupboard is not None:
@@ -78,6 +80,24 @@ def read_cupboard(path: str | os.PathLike[str]) -> Cupboard:
         if fault.file is None:
             fault.file, fault.line = os.fspath(path), line_of(files.read_text(path), fault.field)
         raise
+
+
+def held(path: str | os.PathLike[str]) -> dict[str, dict[str, Any]]:
+    """Return the silicones, motors and printers that a cupboard holds, by kind and name, its own entries among them.
+
+    A kind that its table `at_hand` does not narrow is the whole catalogue. Raises as `read_cupboard`.
+    """
+    cupboard = read_cupboard(path)
+    given, at_hand = read_toml(Path(path)).get("at_hand", {}), cupboard.at_hand
+    named = {"materials": at_hand.materials, "motors": at_hand.motors, "printers": (at_hand.printer,)}
+    keys = {"materials": "materials", "motors": "motors", "printers": "printer"}
+    found = dict[str, dict[str, Any]]()
+    for kind, names in named.items():
+        own = getattr(cupboard, kind)
+        known: dict[str, Any] = getattr(catalogue, kind)(own)
+        kept = {*(names or known), *own} if keys[kind] in given else {*known}
+        found[kind] = {name: entry for name, entry in known.items() if name in kept}
+    return found
 
 
 def add_entry(path: Path, kind: str, name: str, table: str) -> None:

@@ -61,6 +61,10 @@ def sheets_of(mesh: Mesh, a: Floats, b: Floats, alone: Floats, limits: Resolutio
         flat = (corners[mine] - corners[largest, 0]) @ frame[:, :2]
         flat[way[mine] < 0] = flat[way[mine] < 0][:, ::-1]  # all turn one way
         kind = np.where(faces[mine] >= 2 * n, 2, way[mine] > 0)
+        # Of triangles that lie on each other, one fills the same area; many are slow.
+        key = np.column_stack([kind, np.sort(ids.reshape(-1, 3)[mine], axis=1)])
+        once = np.unique(key, axis=0, return_index=True)[1]
+        flat, kind = flat[once], kind[once]
         down, up, twice = (CrossSection(list(flat[kind == k]), FillRule.NonZero) for k in range(3))
         radius, middle = deepest((down ^ up) + twice)
         if 2 * radius > STEPS * float32_step(corners[mine]):

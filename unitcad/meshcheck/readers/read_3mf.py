@@ -395,9 +395,8 @@ def _drop_modifiers(package: Package, root: Model) -> None:
     """Leave out the triangles that PrusaSlicer's settings call no part of a body: modifiers, supports, holes."""
     config = package.xml(_PRUSA, P002) if _PRUSA in package.parts else None
     for one in config.children if config is not None else ():
-        found = (
-            root.objects().get(int(one.attributes.get("id", ""))) if one.attributes.get("id", "").isdigit() else None
-        )
+        name = one.attributes.get("id", "")
+        found = root.objects().get(int(name)) if schema.index(name) else None
         if one.name != "object" or found is None or found.mesh is None:
             continue
         body = np.ones(len(found.mesh.rows), bool)
@@ -405,7 +404,7 @@ def _drop_modifiers(package: Package, root: Model) -> None:
             settings = {entry.attributes.get("key"): entry.attributes.get("value") for entry in volume.children}
             ends = [volume.attributes.get(end, "") for end in ("firstid", "lastid")]
             part = settings.get("volume_type", "ModelPart") == "ModelPart" and settings.get("modifier", "0") == "0"
-            if volume.name == "volume" and not part and all(end.isdigit() for end in ends):
+            if volume.name == "volume" and not part and all(map(schema.index, ends)):
                 body[int(ends[0]) : int(ends[1]) + 1] = False
         if not body.all():
             found.mesh = _part(found.mesh, body)

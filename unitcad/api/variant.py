@@ -13,7 +13,10 @@ from unitcad.catalogue import materials
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.kernels.mesh import as_trimesh
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.assembly import assembly
+from unitcad.pipeline.mass import MassProperties, mass_properties
 from unitcad.pipeline.plan import unit_section
+from unitcad.report.page import view
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.validation import Source, load
@@ -100,17 +103,51 @@ class Variant(MouldSet):
         solid = super().mesh(body)
         return solid if library == "manifold3d" else as_trimesh(solid)
 
-    def to_build123d(self) -> Any:
-        """Return unit and moulds as a named, coloured build123d Compound, mm. Raises UnitcadError without the extra."""
+    def to_build123d(self, step: int | None = None, exploded: bool = False) -> Any:
+        """Return unit and moulds as a build123d Compound with the children ``unit`` and ``moulds``.
+
+        Parameters
+        ----------
+        step : int, optional
+            Number of a pour: its tools, cured layers and inserts, the silicone in the cavity. Default: the finished
+            unit at its place, and next to it the moulds of the last pour with the other tools aside.
+        exploded : bool, default False
+            Unit and moulds taken apart, side by side.
+
+        Returns
+        -------
+        build123d.Compound
+            Lengths in mm. Each child has one child a body, with its name and colour. No two bodies share volume.
+
+        Raises
+        ------
+        WrongArgument
+            For a pour that there is not.
+        UnitcadError
+            Without the extra, and if the moulds can't be made.
+        """
         from unitcad.kernels import native
 
-        return native.build123d_compound((*self.bodies.values(),))
+        return native.build123d_compound(self.spec.name, self._groups(step, exploded))
 
-    def to_cadquery(self) -> Any:
-        """Return unit and moulds as a named, coloured CadQuery Assembly, mm. Raises UnitcadError without the extra."""
+    def to_cadquery(self, step: int | None = None, exploded: bool = False) -> Any:
+        """Return unit and moulds as a CadQuery Assembly with the children ``unit`` and ``moulds``.
+
+        Parameters and errors are those of ``to_build123d``.
+        """
         from unitcad.kernels import native
 
-        return native.cadquery_assembly((*self.bodies.values(),))
+        return native.cadquery_assembly(self.spec.name, self._groups(step, exploded))
+
+    def _groups(self, step: int | None, exploded: bool) -> dict[str, tuple[Body, ...]]:
+        return {group.name: group.bodies for group in assembly(self, step, exploded)}
+
+    def mass_properties(self) -> MassProperties:
+        """Return volume, mass, centre and inertia of the unit and of each body in it.
+
+        Silicones have the catalogue's densities, the motor the catalogue's mass. Circuit and wires are assumed.
+        """
+        return mass_properties(self)
 
     def show(self) -> None:
         """Show unit and moulds, named and coloured, in ocp-vscode or YACV. Raises UnitcadError without either."""
@@ -135,5 +172,5 @@ class Variant(MouldSet):
             mass = volume * float(material.density_g_cm3) / 1000
             rows.append((body.name, material.name, round(volume, 2), round(mass, 3)))
         head = ("layer", "material", "volume, mm³", "mass, g")
-        drawn = text.drawing(self.section(), f"section of {self.spec.name}")
+        drawn = text.drawing(self.section(), f"section of {self.spec.name}") + view(self.spec)
         return drawn + text.table(head, rows, self.spec.summary)
