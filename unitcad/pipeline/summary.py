@@ -45,7 +45,7 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         yield checked.removeprefix("; ")
     yield from assumed_line(spec, given)
     if casting:
-        yield from casting_summary(casting)
+        yield from casting_summary(casting, manifest["files"])
     if level := manifest["estimate"]:
         yield level["line"]
     yield from to_open(folder)
