@@ -83,7 +83,8 @@ def checks_text(manifest: Manifest) -> str:
     if not checks:
         return ""
     passed = sum(entry["ok"] for entry in checks)
-    faults = [counted(check[f"{kind}s"], kind) for kind in ("error", "warning") if check[f"{kind}s"]]
+    found = (("error", check["errors"]), ("warning", check["warnings"]))
+    faults = [counted(count, kind) for kind, count in found if count]
     files = f", {join_words(faults)} in the files" if faults else ""
     return f"; checks: {passed} of {len(checks)}{files}"
 
