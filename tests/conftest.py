@@ -18,14 +18,16 @@ sys.path.append(str(Path(__file__).parent / "report"))
 
 def pytest_addoption(parser):
     parser.addoption("--cases", type=int, help="run the first N cases of each test, for a look at all of them")
+    parser.addoption("--first", type=int, help="run the first N tests of each file, for a look at all of them")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Count a test that drives a browser or the slicer as long, unless it is marked `smoke`; keep `--cases`."""
-    if most := config.getoption("cases"):
-        cases = groupby(items, lambda item: item.nodeid.partition("[")[0])
-        items[:] = [item for _, group in cases for item in islice(group, most)]
+    """Count a test that drives a browser or the slicer as long, unless it is marked `smoke`; keep `--cases` and `--first`."""
+    for option, end in (("cases", "["), ("first", "::")):
+        if most := config.getoption(option):
+            groups = groupby(items, lambda item, end=end: item.nodeid.partition(end)[0])
+            items[:] = [item for _, group in groups for item in islice(group, most)]
     for item in items:
         slow = "browser" in item.fixturenames or item.get_closest_marker("slicer")
         if slow and not item.get_closest_marker("smoke"):

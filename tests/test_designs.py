@@ -5,8 +5,8 @@ import math
 import pytest
 from msgspec.structs import replace
 
+from unitcad.api.variant import Variant
 from unitcad.designs.limits import SLOT_CLEARANCE
-from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
 
 NAMES = sorted(templates())

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from unitcad.api.variant import Variant
 from unitcad.export import raster
 from unitcad.export.raster import Surface
 from unitcad.pipeline.scenes import exploded_view, unit_cut_open
-from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
 
 ROOT = Path(__file__).parents[1]

@@ -4,9 +4,9 @@ import re
 import pytest
 from sample_bodies import tongue, tube
 
+from unitcad.api.variant import Variant
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import Revolve, Union, cylinder, moved, polygon, turned
 from unitcad.shape.tree import Body
 from unitcad.validation import templates

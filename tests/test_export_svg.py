@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_bodies import base, cup, layers, tube
 
+from unitcad.api.variant import Variant
 from unitcad.export import svg
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, moved
 from unitcad.shape.tree import Body
 from unitcad.validation import templates

@@ -218,10 +218,12 @@ class _Tags(HTMLParser):
     def __init__(self):
         super().__init__()
         self.open, self.seen, self.images = list[str](), set[str](), list[str]()
+        self.sandboxes = list[str | None]()
 
     def handle_starttag(self, tag, attrs):
         self.seen |= {tag, *(name for name, _ in attrs)}
         self.images += [value or "" for name, value in attrs if name == "src"]
+        self.sandboxes += [dict(attrs).get("sandbox") for _ in [tag] if tag == "iframe"]
         if tag != "img":
             self.open.append(tag)
 
@@ -253,7 +255,10 @@ def check_shown(value):
     tags.feed(value._repr_html_())
     tags.close()
     assert tags.open == []
-    assert tags.seen <= {"table", "caption", "tr", "th", "td", "img", "src", "alt"}
+    frame = {"iframe", "title", "sandbox", "style", "srcdoc"}
+    assert tags.seen <= {"table", "caption", "tr", "th", "td", "img", "src", "alt"} | frame
+    # The 3D view may run programs, in a frame that neither the notebook nor any address can be reached from.
+    assert tags.sandboxes in ([], ["allow-scripts"])
     for image in tags.images:
         kind, _, content = image.partition(",")
         assert kind == "data:image/svg+xml;base64"

@@ -16,7 +16,9 @@ from tests.in_process import unitcad
 from unitcad.attenuation.curve import contact
 from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import UniformDisc
+from unitcad.attenuation.radial import panel_ends
 from unitcad.catalogue import touch
+from unitcad.errors import Refusal
 from unitcad.estimate_inputs import answer_spec, estimate_input
 from unitcad.export.field import contour_lines
 from unitcad.skin_map import LARGEST_KB, amplitude, field_of, map_data, table_of, unit_map
@@ -188,3 +190,27 @@ def test_what_is_not_known_is_said():
     assert field_of(dome).contour is None
     assert field_of(dome).unit == "of the edge"
     assert all("Least pitch" in made.lines[1] for made in (slow, gel, dome))
+
+
+def test_waves_that_do_not_die_have_no_last_radius():
+    """An undamped tissue: at the table's end the motion still passes the share, and a later crest may too."""
+    layers = {"a": {"thickness_mm": 2, "youngs_modulus_kpa": 20}, "b": {"youngs_modulus_kpa": 30}}
+    sets = [
+        *(f"tissue.mine.{name}.{key}={value}" for name, layer in layers.items() for key, value in layer.items()),
+        *(f"tissue.mine.{name}.{key}" for name in layers for key in ("density_kg_m3=1000", "poisson_ratio=0.49")),
+        "estimate.tissue=mine",
+    ]
+    made = unit_map(load("encapsulating", sets))
+    assert made.kinds[0].pitch_mm.value is None
+    assert "beyond the map" in made.lines[1]
+    assert made.kinds[0].error < 1e-6
+
+
+def test_waves_too_short_for_a_map_are_refused_with_a_frequency_that_is_taken():
+    with pytest.raises(Refusal, match="its waves are too short for a map of this size") as told:
+        unit_map(FLAT, 4000.0)
+    assert told.value.field == "estimate.frequency_hz"
+    slowest, disc = 1.6, FLAT.motor.diameter_mm / 2e3
+    width = 4.8 * slowest / (2 * math.pi * told.value.nearest)
+    assert 600 < told.value.nearest < 2000
+    assert len(panel_ends(disc, 0.121, width)) <= 160

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from unitcad.api.check_call import check as check
     from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
     from unitcad.api.estimate_call import estimate as estimate
+    from unitcad.api.variant import Variant as Variant
     from unitcad.catalogue import MaterialEntry as Material
     from unitcad.catalogue import materials as materials
     from unitcad.catalogue import motors as motors
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from unitcad.errors import Refusal as Refusal
     from unitcad.errors import UnitcadError as UnitcadError
     from unitcad.pipeline.mass import MassProperties as MassProperties
-    from unitcad.pipeline.variant import Variant as Variant
     from unitcad.spec import Spec as Spec
     from unitcad.spec.raw import CastingTable as Casting
     from unitcad.spec.raw import EstimateTable as Estimate
@@ -98,7 +98,7 @@ _PLACES = {
     "Refusal": "errors:Refusal",
     "Spec": "spec:Spec",
     "UnitcadError": "errors:UnitcadError",
-    "Variant": "pipeline.variant:Variant",
+    "Variant": "api.variant:Variant",
     "Wires": "spec.raw:WiresTable",
     "attenuation": "attenuation",
     "build": "api.build_call:build",

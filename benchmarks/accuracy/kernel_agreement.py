@@ -17,10 +17,10 @@ from benchmarks.accuracy.measures import mesh_volume
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.measurements import interleaved, timing
 from unitcad.accuracy.random_specs import seeded_spec
+from unitcad.api.variant import Variant
 from unitcad.designs import shipped
 from unitcad.errors import Refusal
 from unitcad.kernels import bounds, mesh, occt
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
 from unitcad.validation import from_data, templates
 

@@ -17,8 +17,8 @@ from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.measures import mesh_volume
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.measurements import Timing, interleaved, timing
+from unitcad.api.variant import Variant
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.variant import Variant
 from unitcad.validation import default_template, load
 
 ROOT = Path(__file__).parents[2]

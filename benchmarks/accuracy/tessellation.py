@@ -12,8 +12,8 @@ from benchmarks.accuracy.measures import mesh_volume
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.measurements import TOLERANCES, Mesh, Timing, interleaved
 from unitcad.accuracy.occt_distance import distance
+from unitcad.api.variant import Variant
 from unitcad.kernels import bounds, mesh
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
 from unitcad.spec.raw import OutputTable
 from unitcad.validation import default_template, load

@@ -11,13 +11,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from unitcad.api.variant import Variant
 from unitcad.designs.limits import filament_groove
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH, plate_bottom, pry_floor
 from unitcad.moulds.cup import ROOT, ribs, window_section
 from unitcad.moulds.filament import FILAMENT_TAIL, FLARE
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.pieces import BLADE_EDGE, BLADE_THICKNESS
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import mm
 from unitcad.shape.lettering import HEIGHT, outlines, text_width
 from unitcad.spec import printer_of

@@ -7,8 +7,8 @@ from typing import Any
 
 from run_script import main
 
+from unitcad.api.variant import Variant
 from unitcad.pipeline import plan as body_files
-from unitcad.pipeline.variant import Variant
 
 
 def make(n: dict[str, Any]) -> dict[str, Any]:

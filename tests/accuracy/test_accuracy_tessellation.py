@@ -9,7 +9,7 @@ pytest.importorskip("cadquery")
 from benchmarks.accuracy import tessellation
 from benchmarks.accuracy.measures import mesh_volume
 from unitcad.accuracy.measurements import timing
-from unitcad.pipeline.variant import Variant
+from unitcad.api.variant import Variant
 from unitcad.shape import Revolve
 
 

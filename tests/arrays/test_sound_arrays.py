@@ -1,5 +1,7 @@
 """Arrays of every construction and many sizes keep every mould check, and each tool prints without support."""
 
+from functools import partial
+
 import pytest
 
 from tests.arrays.made_arrays import findings, made
@@ -10,12 +12,13 @@ from unitcad.checks import check_moulds, mould_checks
 
 PAIR = "layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3,8]"
 PATCH, POCKETS, CURVED, LOW = "forearm-patch", "forearm-pockets", "sleeve-curved", "unit=single-embedded"
+long = partial(pytest.param, marks=pytest.mark.long)
 SHIPPED = [
     (PATCH,),
     (PATCH, "unit=three-layer", "layout.pitch_mm=24", *PAIR),
     (PATCH, "unit=single-encapsulating", "moulds.printer=fdm-0.25", *PAIR),
-    (PATCH, "layout.columns=1", "layout.pitch_mm=18"),
-    (PATCH, "layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.printer=fdm-0.25", "sheet.thickness_mm=1.5"),
+    long((PATCH, "layout.columns=1", "layout.pitch_mm=18")),
+    long((PATCH, "layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.printer=fdm-0.25", "sheet.thickness_mm=1.5")),
     (PATCH, "sheet.thickness_mm=0.6", "circuit.row_width_mm=2", "layout.pitch_mm=[18,19]", "sheet.margin_mm=7",
      "layout.columns=2", "layout.rows=2"),
     # Grooves side by side: 0.4 mm apart, and where fins cut what two of them share.
@@ -25,15 +28,15 @@ SHIPPED = [
       for name, slot in ((PATCH, "sheet.strap_slot_mm=[3,3]"), (POCKETS, "sheet.strap_slot_mm=[3,2]"))),
     # Tools larger than the bed, along x and along y.
     ("wrist-band",),
-    pytest.param((PATCH, "moulds.bed_x_mm=60"), marks=pytest.mark.long),
-    ("hex-19", "moulds.bed_y_mm=80"),
+    long((PATCH, "moulds.bed_x_mm=60")),
+    long(("hex-19", "moulds.bed_y_mm=80")),
     (POCKETS, "layout.columns=12", "layout.rows=1", "sheet.strap_slot_mm=[3,8]"),
     (POCKETS,),
     ("hex-19",),
     # The groove of a low tray, and a unit that is held under its tail.
     *((POCKETS, f"sheet.thickness_mm={mm}", LOW) for mm in (0.6, 1.2)),
     (CURVED, "layout.columns=2", "layout.rows=1"),
-    pytest.param((CURVED,), marks=pytest.mark.long),
+    long((CURVED,)),
 ]  # fmt: skip
 
 

@@ -31,6 +31,7 @@ LIGHT = {
     "measure": [],
 }
 """Options with which a command that takes the file does little."""
+LIGHTER = {("estimate", "--fit"), ("build", "--out")}
 SOUND = {
     "build": ["single-embedded"], "estimate": ["single-embedded"], "batch": ["published", "--dry-run"],
     "check": ["sound.stl"], "serve": ["single-embedded"], "material": ["sound.csv"], "measure": ["campaign.toml"],
@@ -106,7 +107,13 @@ def call(words, option, name):
     """The words of a command that is given a file."""
     command = words[0]
     if option:
-        return [*words, *SOUND.get(command, []), *(LIGHT.get(command, []) if option == "--fit" else []), option, name]
+        return [
+            *words,
+            *SOUND.get(command, []),
+            *(LIGHT[command] if (command, option) in LIGHTER else []),
+            option,
+            name,
+        ]
     return [*words, name, *LIGHT.get(command, [])]
 
 

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from unitcad.pipeline.variant import Variant
+from unitcad.api.variant import Variant
 from unitcad.pipeline.write import build
 from unitcad.validation import load
 

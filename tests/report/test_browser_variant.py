@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from chromium import LISTEN, Visit, launched
 
+from unitcad.api.variant import Variant
 from unitcad.pipeline.scenes import moments
-from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load, templates

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from unitcad.api.variant import Variant
 from unitcad.export import glb
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.plan import glb_content
-from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, cylinder
 from unitcad.validation import templates
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from unitcad.api.variant import Variant
 from unitcad.export.raster import Surface, draw
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.scenes import exploded_moves, moments, pictures, unit_apart
-from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import build
 from unitcad.shape import box
 from unitcad.validation import load

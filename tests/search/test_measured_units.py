@@ -16,7 +16,7 @@ def test_a_control_of_a_design_that_is_not_said_is_one_unit():
         check=False,
     ).data
     assert [one["design"] for one in made["proposals"]] == ["embedded", "encapsulating"]
-    assert all("of which design is not said" in level_line(one) for one in made["proposals"])
+    assert all("the paper, which does not name the design" in level_line(one) for one in made["proposals"])
 
 
 def test_a_unit_measured_outside_the_goals_is_no_proposal():

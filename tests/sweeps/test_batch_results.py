@@ -78,10 +78,10 @@ def test_the_last_line_s_sums_and_plurals(tmp_path):
     done = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--keep-going")
     assert done.returncode == 1
     made = done.stdout.splitlines()[0].rpartition("; ")[0]
-    assert made == "2 of 4 variants made; 2 failed; 1 geometry, 1 variant made only of known parts"
+    assert made == "2 of 4 variants made; 2 failed; 1 geometry, 1 variant without a new part"
     again = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--limit", 1)
     made = again.stdout.splitlines()[0].rpartition("; ")[0]
-    assert made == "1 of 1 variant made (1 from before); 0 failed; 0 geometries, 0 variants made only of known parts"
+    assert made == "1 of 1 variant made (1 from before); 0 failed"
 
 
 def test_folders_that_are_not_ours(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import string
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -150,14 +149,14 @@ def _print_spec(data: dict[str, Any]) -> None:
 def _print_amplification(results: Sequence[dict[str, Any]]) -> None:
     moves = {name: [one["by"].get(name) or 0.0 for one in results] for one in results for name in one["by"]}
     most = sorted(moves, key=lambda name: -max(map(abs, moves[name])))[:_INPUTS]
-    letters = string.ascii_lowercase[: len(results)]
-    rows = [{"input": name, **dict(zip(letters, moves[name], strict=True))} for name in most]
+    heads = [one["result"].replace("edge level, model ", "level, ") for one in results]
+    rows = [{"input": name, **dict(zip(heads, moves[name], strict=True))} for name in most]
     title = f"Change of a result over the change of an input, each moved by 1e-6: the {len(most)} strongest inputs"
-    _table(title, {name: name for name in ("input", *letters)}, rows)
-    for letter, one in zip(letters, results, strict=True):
+    _table(title, {name: name for name in ("input", *heads)}, rows)
+    for head, one in zip(heads, results, strict=True):
         worst = f"at most {_shown(one['amplification'])}, by {one['worst']}" if one["worst"] else "no finite value"
         worst = worst if one["amplification"] != 0 else "reads none of them"
-        _line(f"{letter}: {one['result']}: {worst}")
+        _line(f"{head}: {worst}")
 
 
 def _table(title: str, heads: dict[str, str], rows: Sequence[dict[str, Any]]) -> None:

@@ -36,7 +36,7 @@ def amplifications(spec: Spec, variant: EstimateInput) -> dict[str, Any]:
         for model in models
     }
     edge, far = _motions(moved)
-    results |= {"motion of the skin at the edge": edge, f"the same {1e3 * _FAR:g} mm on, over it": far / edge}
+    results |= {"motion of the skin at the edge": edge, f"motion {1e3 * _FAR:g} mm from the edge, over it": far / edge}
     return {"step": STEP, "results": [_moves(name, variant, values) for name, values in results.items()]}
 
 

@@ -12,13 +12,14 @@ from typing import Protocol
 
 from unitcad import text
 from unitcad.api.changes import all_changes
+from unitcad.api.variant import Variant
 from unitcad.arguments import path, texts
 from unitcad.pipeline.manifest import PAGE
 from unitcad.pipeline.subjects import load_subject
-from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import Built, hold_folder
 from unitcad.pipeline.write import build as build_whole
 from unitcad.report import write_report
+from unitcad.report.page import view
 from unitcad.spec import Spec
 from unitcad.spec.raw import OUTPUTS, Format
 from unitcad.validation import Changes, Source
@@ -87,7 +88,7 @@ class BuildResult(Built):
             if not finding["ok"]
         ]
         checks = text.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
-        drawn = text.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
+        drawn = text.drawing(Variant(self.spec).section(), f"section of {self.spec.name}") + view(self.spec)
         return drawn + bodies + checks + text.table((), self._counts)
 
     @property

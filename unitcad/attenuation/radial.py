@@ -24,7 +24,8 @@ _RATIO, _FINEST = 3.0, 1e-5
 """Between neighbouring panels at the disc's edge, and the last one's width over the disc's radius."""
 _TURN = 4.8
 """Phase of the shortest shear wave over a panel, rad: 13 terms leave 1e-8 of it."""
-_MOST_PANELS = 400
+_MOST_PANELS = 160
+"""Some seconds of the solver."""
 _RTOL, WANTED = 2e-7, 1e-6
 _PROBES = 40
 
@@ -71,13 +72,13 @@ class RadialTable:
     def last_above(self, share: float, factor: Callable[[np.ndarray], Any] = lambda r: 1.0) -> float:
         """Return the largest radius (m) at which |u| over that at the edge, times a factor, is at least a share.
 
-        0 if it is so nowhere, infinity if it still is at the end of the table.
+        0 if it is so nowhere, infinity if it still is in the last tenth of the table: a later crest may be.
         """
         radii = np.concatenate([np.linspace(a, b, 9)[:-1] for a, b in pairwise(self.ends)] + [self.ends[-1:]])
         above = np.flatnonzero(self.size(radii) * factor(radii) >= share)
         if not above.size:
             return 0.0
-        if above[-1] == radii.size - 1:
+        if radii[above[-1]] >= 0.9 * self.reach:
             return float("inf")
         low, high = radii[above[-1]], radii[above[-1] + 1]
         for _ in range(50):
@@ -96,9 +97,9 @@ def radial_table(variant: EstimateInput, reach: float) -> RadialTable:
     medium, load, omega = case(variant, variant.drive, {})
     slowest = min(np.sqrt(layer.shear_modulus.middle / layer.density) for layer in variant.tissue)
     width = _TURN * slowest / omega
-    ends = _ends(load.radius, reach, width)
+    ends = panel_ends(load.radius, reach, width)
     if len(ends) > _MOST_PANELS:
-        nearest = float(f"{0.9 * variant.frequency.middle * _MOST_PANELS / len(ends):.2g}")
+        nearest = float(f"{0.85 * variant.frequency.middle * _MOST_PANELS / len(ends):.2g}")
         raise Refusal(
             "estimate.frequency_hz", variant.frequency.middle, "its waves are too short for a map of this size", nearest
         )
@@ -118,7 +119,7 @@ def radial_table(variant: EstimateInput, reach: float) -> RadialTable:
     return RadialTable(ends, terms, float((off + found.error) / found.largest))
 
 
-def _ends(disc: float, reach: float, width: float) -> np.ndarray:
+def panel_ends(disc: float, reach: float, width: float) -> np.ndarray:
     """Return the ends of the panels from 0 to the reach or just beyond, at most `width` long."""
     steps = disc * _RATIO ** -np.arange(1.0, np.ceil(np.log(1.0 / _FINEST) / np.log(_RATIO)) + 1.0)
     corners = np.concatenate([[0.0], disc - steps, [disc], disc + steps[::-1]])
@@ -126,5 +127,5 @@ def _ends(disc: float, reach: float, width: float) -> np.ndarray:
     while far[-1] < reach:
         far.append(far[-1] + min(width, (_RATIO - 1.0) * (far[-1] - disc)))
     corners = np.concatenate([corners[:-1], far])
-    parts = [np.linspace(a, b, max(int(np.ceil((b - a) / width)), 1) + 1)[:-1] for a, b in pairwise(corners)]
+    parts = [np.linspace(a, b, max(int(np.ceil((b - a) / width - 1e-9)), 1) + 1)[:-1] for a, b in pairwise(corners)]
     return np.concatenate([*parts, corners[-1:]])

@@ -25,7 +25,7 @@ WIRE_G_CM3 = 4.0
 class MassProperties:
     """Mass properties of a unit or of one of its bodies, in the frame of the unit: z = 0 at the skin.
 
-    Attributes
+    Parameters
     ----------
     volume_mm3 : float
         Volume, mm3.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.pipeline.subjects import compound
 from unitcad.report import read_results
 from unitcad.report.bench_page import write_bench
-from unitcad.report.html_page import Pool, asset, compress, html_page
+from unitcad.report.html_page import VIEW, Pool, asset, compress, html_page, plain_page
 from unitcad.report.read_results import VariantRecord
 from unitcad.spec import Spec
 
@@ -53,6 +54,20 @@ def model(spec: Spec) -> dict[str, Any]:
         "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
         "moulds_apart": {name: list(offset) for name, offset in exploded_moves(moulds).items()},
     }
+
+
+def view(spec: Spec) -> str:
+    """Return the 3D view of a unit and its moulds as an element for a notebook; "" if the moulds can't be made.
+
+    It is a page in a frame that runs only its own programs and contacts nothing.
+    """
+    try:
+        content = plain_page(spec.name, VIEW, model(spec))
+    except UnitcadError:
+        return ""
+    style = "width: 100%; height: 640px; border: 0"
+    title = escape(f"{spec.name} in 3D")
+    return f'<iframe title="{title}" sandbox="allow-scripts" style="{style}" srcdoc="{escape(content)}"></iframe>'
 
 
 def cells(moulds: MouldSet) -> list[list[float]]:

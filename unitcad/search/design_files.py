@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from unitcad import files
+from unitcad.api.variant import Variant
 from unitcad.errors import UnitcadError
 from unitcad.pipeline import write as folders
-from unitcad.pipeline.variant import Variant
 from unitcad.report.html_page import drawing, plain_page
 from unitcad.search.candidates import Say, limits
 from unitcad.search.proposals import Inversion, name_of, order_rows

@@ -108,7 +108,7 @@ def measurement(target: Target, variant: EstimateInput) -> dict[str, Any] | None
         level, also, by = own[0]["value"], None, f"your lab ({own[0]['unit']})"
     elif block and block.get("same_size") and block["level"] is not None:
         level, also = block["level"], block.get("also_printed")
-        by = "the paper" if len(variant.layers) > 1 else "the paper, of which design is not said"
+        by = "the paper" if len(variant.layers) > 1 else "the paper, which does not name the design"
     else:
         return None
     least, most = target.goals.edge_min or 0.0, target.goals.edge_max or np.inf

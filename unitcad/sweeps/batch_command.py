@@ -149,7 +149,7 @@ def batch(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write a row a variant, the least level first, to FILE.csv or FILE.parquet, whatever else is made.",
+            help="Table of all variants, the least level first, as FILE.csv or FILE.parquet. Default: none.",
         ),
     ] = None,
     no_check: NoCheck = False,
@@ -217,12 +217,12 @@ def _print_summary(summary: Summary, folder: Path, store: str | None) -> None:
         warn(f"stopped: {summary.stopped}; the same command resumes")
     before = f" ({summary.resumed} from before)" if summary.resumed else ""
     left = summary.variants - summary.done
+    made = f"{counted(summary.geometries, 'geometry', 'geometries')}, {counted(summary.reused, 'variant')} without a new part"
     parts = [
         f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
         f"{summary.failed} failed",
         *([f"{left} not tried"] if left else []),
-        f"{counted(summary.geometries, 'geometry', 'geometries')}, {counted(summary.reused, 'variant')} made only of "
-        "known parts",
+        *([made] if summary.geometries or summary.reused else []),
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))

@@ -62,7 +62,7 @@
     let i = radii.length - 1;
     while (i >= 0 && size(map, kind, radii[i]) < share) i--;
     if (i < 0) return 0;
-    if (i === radii.length - 1) return null;
+    if (radii[i] >= 0.9 * ends[ends.length - 1]) return null; // a later crest may be above it
     let [low, high] = [radii[i], radii[i + 1]];
     for (let k = 0; k < 50; k++) {
       const middle = (low + high) / 2;

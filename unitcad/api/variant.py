@@ -16,6 +16,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.assembly import assembly
 from unitcad.pipeline.mass import MassProperties, mass_properties
 from unitcad.pipeline.plan import unit_section
+from unitcad.report.page import view
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.validation import Source, load
@@ -171,5 +172,5 @@ class Variant(MouldSet):
             mass = volume * float(material.density_g_cm3) / 1000
             rows.append((body.name, material.name, round(volume, 2), round(mass, 3)))
         head = ("layer", "material", "volume, mm³", "mass, g")
-        drawn = text.drawing(self.section(), f"section of {self.spec.name}")
+        drawn = text.drawing(self.section(), f"section of {self.spec.name}") + view(self.spec)
         return drawn + text.table(head, rows, self.spec.summary)
