@@ -112,3 +112,16 @@ def test_the_summary_names_the_pours_whose_bubbles_stay():
     assert lines[0].endswith(". Mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30.")
     assert " at the bench. Out of the mould " in lines[1]
     assert len(lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("files", "named"),
+    [
+        (["moulds/base.stl", "moulds/moulds.3mf"], "moulds/moulds.3mf"),
+        (["moulds/base.stl"], "each STL of moulds/ (no 3MF was asked for)"),
+        (["casting.md"], "moulds/moulds.3mf"),
+    ],
+)
+def test_the_summary_names_files_that_were_made(files, named):
+    first, *_ = casting_summary(asdict(casting("encapsulating")), files)
+    assert first.startswith(f"print {named}: layers 0.2")

@@ -42,7 +42,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         yield from assumed_line(unit, given, array.paths_of(unit)[0])
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
-        lines = casting_summary(read_json(folder / "casting.json"))
+        lines = casting_summary(read_json(folder / "casting.json"), manifest["files"])
         yield from (line for line in lines if line not in told)
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():

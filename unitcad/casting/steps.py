@@ -141,10 +141,11 @@ def grams_of(procedure: Mapping[str, Any]) -> dict[str, float]:
     return dict(grams)
 
 
-def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
+def casting_summary(procedure: Mapping[str, Any], files: Iterable[str] = ()) -> Iterator[str]:
     """Yield a line each: what to print and mix, when which part is ready, and warnings about a pour.
 
-    `procedure` is a `Procedure` as plain data, as casting.json has it.
+    `procedure` is a `Procedure` as plain data, as casting.json has it; `files` are the paths of the result, if they are
+    known: pieces that have an STL and no plate in 3MF are printed from it.
     """
     total, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
     pours, castings, mixes = procedure["pours"], procedure["castings"], procedure["later_mixes"]
@@ -160,7 +161,10 @@ def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
     layers = f"layers {number(printing['layer_mm'], 3)}, first layer {number(printing['first_layer_mm'], 3)} mm"
     mix = ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams_of(procedure).items())
     filament = f"about {time}, at most {volume} cm3 of {printing['of']}"
-    yield f"print {join_words(printing['plates'])}: {layers}; {filament}. Mix {mix}."
+    plates, paths = printing["plates"], set(files)
+    if any(path.endswith(".stl") for path in paths) and not paths.intersection(plates):
+        plates = ["each STL of moulds/ (no 3MF was asked for)"]
+    yield f"print {join_words(plates)}: {layers}; {filament}. Mix {mix}."
     yield f"{count}, {bench} at the bench. Out of the mould {total} after the print.{then}"
     yield from (f"warning: {line}" for line in pour_warnings(pours))
 

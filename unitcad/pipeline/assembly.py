@@ -66,7 +66,7 @@ def _in_the_mould(moulds: MouldSet, pour: Step) -> Iterator[Body]:
     layers = [pour.earlier[i : i + cells] for i in range(0, len(pour.earlier), cells)]
     for other, shapes in zip(moulds.plan.steps, (*layers[: pour.index - 1], pour.layer), strict=False):
         drawn = like.get(other.name, moulds.unit[0])
-        yield replace(drawn, name=other.name, shape=union(shapes) if len(shapes) > 1 else shapes[0])
+        yield replace(drawn, name=other.name, shape=union(shapes) if len(shapes) != 1 else shapes[0])
     yield from pour.inserts
 
 

@@ -45,7 +45,7 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         yield checked.removeprefix("; ")
     yield from assumed_line(spec, given)
     if casting:
-        yield from casting_summary(casting)
+        yield from casting_summary(casting, manifest["files"])
     if level := manifest["estimate"]:
         yield level["line"]
     yield from to_open(folder)
@@ -83,7 +83,8 @@ def checks_text(manifest: Manifest) -> str:
     if not checks:
         return ""
     passed = sum(entry["ok"] for entry in checks)
-    faults = [counted(check[f"{kind}s"], kind) for kind in ("error", "warning") if check[f"{kind}s"]]
+    found = (("error", check["errors"]), ("warning", check["warnings"]))
+    faults = [counted(count, kind) for kind, count in found if count]
     files = f", {join_words(faults)} in the files" if faults else ""
     return f"; checks: {passed} of {len(checks)}{files}"
 

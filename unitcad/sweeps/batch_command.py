@@ -149,7 +149,7 @@ def batch(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write a row a variant, the least level first, to FILE.csv or FILE.parquet, whatever else is made.",
+            help="Table of all variants, the least level first, as FILE.csv or FILE.parquet. Default: none.",
         ),
     ] = None,
     no_check: NoCheck = False,

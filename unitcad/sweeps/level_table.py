@@ -44,7 +44,7 @@ def write_table(path: Path, sweep: Sweep, folder: Path) -> None:
     rows: list[dict[str, Any]] = batch["variants"]
     columns = [name for name in batch["columns"] if name != _FOLDER]
     if not set(_EDGE) & set(columns) and not sweep.of_compounds:
-        rows = [row | _levels(sweep, row["index"]) for row in rows]
+        rows = [{**row, **_levels(sweep, row["index"])} for row in rows]
         columns += _EDGE
     columns = [*in_order(columns, swept_columns(columns)), _FOLDER]
     lead = _EDGE[0]
