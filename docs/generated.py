@@ -32,8 +32,15 @@ FILES = [kind for kind in file_kinds() if kind.model]
 def on_files(files: Files, config: Any) -> Files:
     """Add the generated pages to those of the folder; mkdocs calls this."""
     for path, text in pages().items():
+        if written := files.get_file_from_path(path):  # the page of a spec has its keys added
+            files.remove(written)
         files.append(File.generated(config, path, content=text))
     return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Return a page's text with plain fences: a second word, which tests read, would hide them from mkdocs."""
+    return re.sub(r"(?m)^```(\w+) (?:notebook|brep)$", r"```\1", markdown)
 
 
 def pages() -> dict[str, str]:
@@ -43,18 +50,34 @@ def pages() -> dict[str, str]:
         "reference/mesh-rules.md": mesh_rules(),
         "reference/mould-checks.md": mould_check_page(),
         "reference/recording-findings.md": recording_findings(),
-        **{f"reference/{kind.name}-file.md": keys_of_file(kind.name, load(kind.model)) for kind in FILES},
+        "reference/spec.md": spec_page(),
+        **{
+            f"reference/{kind.name}-file.md": keys_of_file(kind.name, load(kind.model))
+            for kind in FILES
+            if kind.name != "spec"
+        },
     }
 
 
+def spec_page() -> str:
+    """Return the page of the spec as written, with the keys of every table after it."""
+    written = (Path(__file__).parent / "reference" / "spec.md").read_text("utf-8")
+    keys = keys_of_file("spec", RawSpec).partition("\n## ")[2]
+    return f"{written.rstrip()}\n\n## {keys}"
+
+
 def mesh_rules() -> str:
-    """Return a section for each rule of `unitcad check`, family by family."""
+    """Return a table of all rules of `unitcad check`, and a section for each, family by family."""
     lines = [
         "# Mesh rules",
         "",
         "An error fails `unitcad check`. A warning fails it with `--fail-on warning`, an info never does.",
         "`unitcad check --explain CODE` prints the same text.",
         "[Check meshes in CI](../how-to/checks-in-ci.md) shows how to run the rules.",
+        "",
+        "| code | finding | severity |",
+        "| --- | --- | --- |",
+        *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.title} | {rule.severity} |" for rule in rules().values()),
         "",
     ]
     for letter, family in FAMILIES.items():
@@ -66,7 +89,7 @@ def mesh_rules() -> str:
 
 
 def _rule(rule: Rule, level: str) -> list[str]:
-    title = f"{level} {rule.code} {rule.title} ({rule.severity})"
+    title = f"{level} {rule.code} {rule.title} ({rule.severity}) {{#{rule.code.lower()}}}"
     return [title, "", rule.cause, "", f"**Example.** {rule.example}", "", f"**Fix.** {rule.fix}", ""]
 
 
@@ -119,7 +142,7 @@ def keys_of_file(name: str, model: type[Struct]) -> str:
     ]
     for header, table in tables(model):
         if model is not RawSpec and table in set(dict(tables(RawSpec)).values()):
-            lines += [f"## {header}", "", "The same keys as in a [spec file](spec-file.md).", ""]
+            lines += [f"## {header}", "", "The same keys as in a [spec file](spec.md).", ""]
             continue
         about = inspect.cleandoc(table.__doc__ or "").partition("\n\n")[0]
         lines += [f"## {header or 'The file'}", "", about, "", *_keys(table)]

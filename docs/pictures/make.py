@@ -84,7 +84,8 @@ def pictures() -> dict[str, bytes]:
     made["dome-unit.png"] = unit_cut_open(dome)
     made["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
     made["phantom-box.png"] = box_taken_apart(phantom_set(load_phantom("skin")))
-    return {name: small(image) for name, image in made.items()}
+    section = {"encapsulating-section.svg": variants["encapsulating"].section().encode()}
+    return section | {name: small(image) for name, image in made.items()}
 
 
 def box_taken_apart(phantom: PhantomSet) -> bytes:

@@ -42,3 +42,15 @@ def test_a_muscle_without_a_bone_under_it_moves_the_skin_as_one_on_bone():
         for layers in ((skin, fat, muscle, bone), (skin, fat, replace(muscle, thickness=None)))
     ]
     assert moved[0] == pytest.approx(moved[1], rel=0.01)
+
+
+def test_both_moduli_of_the_forearms_skin_name_their_method_and_each_other():
+    pressed, waves = (catalogue.tissue(name)[0].youngs_modulus_kpa for name in ("forearm", "forearm-elastography"))
+    assert (pressed.value, pressed.low, pressed.high) == (130, 69, 260)  # the curve's comparisons were made with it
+    assert (waves.value, waves.low, waves.high) == (14.8, 3.5, 26.0)
+    assert "indentation" in pressed.method
+    assert "14.8" in pressed.source
+    assert waves.method == "shear-wave elastography"
+    assert "69 to 260" in waves.source
+    deep = [catalogue.tissue(name)[1:] for name in ("forearm", "forearm-elastography")]
+    assert deep[0] == deep[1]

@@ -128,10 +128,11 @@ LINK = re.compile(r"\]\(([^)\s#]*)(?:#([^)\s]+))?\)")
 
 
 def _anchors(text):
-    """The headings of a page as GitHub writes them in links."""
+    """The headings of a page as GitHub writes them in links, or by the name that a generated page gives them."""
     headings = re.findall(r"^#+ +(.+?) *$", re.sub(BLOCK, "", text), re.MULTILINE)
+    given = {name for heading in headings for name in re.findall(r"\{#([\w-]+)\}$", heading)}
     plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower() for heading in headings]
-    return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
+    return given | {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
 
 
 GENERATED = {(ROOT / "docs" / name).resolve(): text for name, text in generated_pages().items()}

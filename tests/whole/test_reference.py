@@ -23,7 +23,7 @@ PAGES = pages()
 
 def test_the_spec_page_has_every_key_of_every_table():
     for header, table in tables(RawSpec):
-        section = PAGES["reference/spec-file.md"].split(f"## {header or 'The file'}\n")[1].split("\n## ")[0]
+        section = PAGES["reference/spec.md"].split(f"## {header or 'The file'}\n")[1].split("\n## ")[0]
         assert re.findall(r"(?m)^\| `(\w+)` \|", section) == list(fields_of(table)), header
 
 
@@ -37,7 +37,7 @@ def test_the_spec_page_has_every_key_of_every_table():
     ],
 )
 def test_every_key_of_the_catalogue_has_its_range(kind, entry):
-    section = PAGES["reference/spec-file.md"].split(f"## [{kind}.NAME")[1].split("\n## ")[0]
+    section = PAGES["reference/spec.md"].split(f"## [{kind}.NAME")[1].split("\n## ")[0]
     for key, annotated in kinds_of(entry):
         (note,) = annotated.__metadata__
         words = ", ".join(f'`"{word}"`' for word in typing.get_args(typing.get_args(annotated)[0]))

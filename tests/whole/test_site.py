@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from docs.readme import HOME, README, home_block
+
 pytest.importorskip("material", reason="the site needs the extra docs")
 ROOT = Path(__file__).parents[2]
 LOADED = re.compile(
@@ -37,6 +39,9 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path):
     done = build(ROOT, tmp_path / "site")
     assert done.returncode == 0, done.stderr
     assert loaded(tmp_path / "site") == []
+    python = (ROOT / "docs/reference/python.md").read_text("utf-8")
+    shown = (tmp_path / "site/reference/python.html").read_text("utf-8")
+    assert shown.count("<h2 id=") == len(re.findall(r"(?m)^## ", python))  # no heading is lost in a block of code
     for page in (ROOT / "docs").rglob("*.md"):
         assert (tmp_path / "site" / page.relative_to(ROOT / "docs").with_suffix(".html")).is_file(), page
         relative = page.relative_to(ROOT / "docs").as_posix()
@@ -45,6 +50,12 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path):
             or relative == "index.md"
             or f"]({relative})" in (ROOT / "docs" / "index.md").read_text("utf-8")
         ), f"the index of the docs lacks {relative}"
+
+
+def test_the_home_shows_what_the_readme_shows():
+    block = re.search(r"(?ms)^```text\n.*?^```$", README.read_text("utf-8"))
+    assert block
+    assert home_block(block[0]) in HOME.read_text("utf-8")
 
 
 def test_a_lost_link_fails_the_site(tmp_path):

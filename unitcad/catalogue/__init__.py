@@ -218,7 +218,7 @@ def tissues() -> Mapping[str, tuple[Tissue, ...]]:
     --------
     >>> from unitcad import catalogue
     >>> list(catalogue.tissues())
-    ['forearm', 'upper-arm', 'palm', 'rigid-plate', 'gel-50kpa']
+    ['forearm', 'forearm-elastography', 'upper-arm', 'palm', 'rigid-plate', 'gel-50kpa']
     """
     return {name: tissue(name) for name in _raw("tissue.toml")}
 
