@@ -143,7 +143,7 @@ def test_a_patch_is_shown_and_changed(browser, pockets):
     # The line above the view has the crosstalk and the pours; the view has the tools too.
     glance = live.page.inner_text("#glance")
     assert glance.startswith(live.page.locator("#estimate p.lead").inner_text())
-    assert glance.endswith("of filament.")
+    assert re.search(r" of filament\. Mix [0-9.]+ g of .*[a-z0-9]\.$", glance)
     radios = live.page.locator(".stage .choice label")
     assert radios.all_inner_texts() == ["Patch", "Moulds"]
     assert "along x" in live.page.inner_text('.stage select[name="axis"]')

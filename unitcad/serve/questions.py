@@ -81,8 +81,13 @@ class Questions:
                     raise
             except MemoryError:
                 raise WorkerEnded("it takes more memory than a worker may have") from None
-            except (UnitcadError, asyncio.CancelledError):
+            except UnitcadError:
                 raise
+            except asyncio.CancelledError:
+                task = asyncio.current_task()
+                if task is None or task.cancelling():
+                    raise
+                raise WorkerEnded("its worker was stopped before it began") from None
             except Exception as error:
                 raise WorkerEnded(f"internal error: {type(error).__name__}: {error} (a bug)") from error
             finally:

@@ -253,7 +253,7 @@
       const change = answer && state.level && state.level.of !== estimate.of && U.compared(answer, state.level.answer);
       const level = crosstalk || answer && `${answer.line} ${change ? `Level against before: ${change}. ` : ""}`;
       const lines = moulds.of === state.unit.text && moulds.model ? moulds.lines || [] : [];
-      clear(glance, level, lines.slice(0, 1).map((line) => `${line[0].toUpperCase()}${line.slice(1)}.`));
+      clear(glance, level, lines.slice(0, 1).map((line) => line[0].toUpperCase() + line.slice(1)));
       glance.dataset.old = "false";
     }
 
