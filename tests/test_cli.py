@@ -125,9 +125,9 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[1].startswith(
         "measure first; assumed: motor.thickness_mm = 2 (2 to 2.65; one of 2.65 mm stands 0.65 mm out at the skin)"
     )
-    assert lines[2].startswith(
-        f"print each STL of moulds/ (no 3MF was asked for): layers 0.2, first layer 0.2 mm; about {duration(procedure['printing']['minutes'])}, at most "
-    )
+    minutes = duration(procedure["printing"]["minutes"])
+    how = f"layers 0.2, first layer 0.2 mm; about {minutes}, at most "
+    assert lines[2].startswith(f"print each STL of moulds/ (no 3MF was asked for): {how}")
     assert lines[2].endswith(". Mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30.")
     out, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
     assert lines[3] == (

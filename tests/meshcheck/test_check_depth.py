@@ -128,3 +128,21 @@ def test_triangles_that_lie_on_each_other_are_judged_once(times, judge):
     """One polygon round the same four corners many times: Clipper splits each edge at each other one for minutes."""
     polygon = f"v 0 0 0\nv 0 0 9\nv 0 9 0\nv 0 9 9\nf {'1 2 3 4 ' * times}\n"
     assert severities(judge(polygon.encode(), "part.obj"))["G009"] == "error"
+
+
+@pytest.mark.parametrize(("corners", "right"), [(400, None), (3000, "error")])
+def test_a_face_of_many_corners_that_crosses_itself_is_not_judged(corners, right, judge):
+    """All its triangles meet: random corners in a plane. A comb of as many corners crosses nothing."""
+    points = np.random.default_rng(1).uniform(0, 100, (corners, 2))
+    comb = [(0.01 * i, 0 if i % 2 else 9) for i in range(corners - 2)] + [(0.01 * corners, -1), (-1, -1)]
+    for places, said in ((points.tolist(), right), (comb, None)):
+        text = "".join(f"v {x} {y} 0\n" for x, y in places) + f"f {' '.join(str(i + 1) for i in range(corners))}\n"
+        found = judge(text.encode(), "part.obj").findings
+        assert next((each.severity for each in found if each.code == "F011"), None) == said
+
+
+@pytest.mark.parametrize("cycle", ["0 1 2 ", "0 1 2 3 "])
+def test_a_polygon_that_runs_over_itself_again_and_again_ends(cycle, judge):
+    times = 100_000 // len(cycle.split())
+    text = f"OFF\n4 1 0\n0 0 0\n10 0 0\n0 10 0\n0 0 10\n{times * len(cycle.split())} {cycle * times}\n"
+    assert judge(text.encode(), "part.off").verdict == "error"
