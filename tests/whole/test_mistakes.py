@@ -52,6 +52,13 @@ COMMANDS = {
     "build unit.toml --set wall=2": "wall = 2: unknown key; known: layers.0.wall_mm or layers.1.wall_mm",
     "build unit.toml --set 'layers[0].wall_mm=2'": "layers[0].wall_mm = 2: unknown key; known: layers.0.wall_mm; "
     "nearest accepted: 'layers.0.wall_mm'",
+    "build unit.toml --set 'layers[1].wal_mm=2'": "layers[1].wal_mm = 2: unknown key; known: layers.1.wall_mm; "
+    "nearest accepted: 'layers.1.wall_mm'",
+    "build unit.toml --set 'layers[5].wall_mm=2'": "layers[5].wall_mm = 2: unknown key; known: layers.0.wall_mm or "
+    "layers.1.wall_mm",
+    "build unit.toml --set 'layers[-1].wall_mm=2'": "layers[-1].wall_mm = 2: unknown key; known: layers.0.wall_mm or "
+    "layers.1.wall_mm",
+    "estimate unit.toml --map nowhere/x.svg": "--map = 'nowhere/x.svg': can't be written: no such file or directory",
     "build unit.toml --set layer.1.wall=2": "layer.1.wall = 2: unknown key; known: layers.1.wall_mm; "
     "nearest accepted: 'layers.1.wall_mm'",
     "build unit.toml --set layers.wall_mm=2": "layers.wall_mm = 2: wall_mm is a key of each entry: layers.0.wall_mm or "

@@ -37,7 +37,7 @@ def _lacks_memory(error: BaseException) -> bool:
 
 
 def _of_the_system(error: OSError) -> UnitcadError:
-    """Return a system's error as one line: of the option -o if the place is in the folder or file that it names."""
+    """Return a system's error as one line: of the option whose folder or file the place is in."""
     if isinstance(error, NotADirectoryError | FileExistsError):
         return in_the_way(Path(error.filename or ""))
     place, why = error.filename, error.strerror or str(error)

@@ -117,10 +117,10 @@ def run(words: list[str]) -> int:
 
 
 def out_of(words: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield the option that names where results go, as typed, and its value."""
+    """Yield the options that name where results go, as typed, and their values."""
     for i, word in enumerate(words):
         option, equals, value = word.partition("=")
-        if option in ("-o", "--out"):
+        if option in ("-o", "--out", "--map", "--svg", "--table"):
             yield option, value if equals else "".join(words[i + 1 : i + 2])
 
 

@@ -19,7 +19,7 @@ from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, finite, with_fi
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, answer_spec, estimate_input, estimate_spec
-from unitcad.files import write
+from unitcad.files import scratch, write
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
 from unitcad.validation import compound_kind, confirm_known, load
@@ -125,6 +125,10 @@ def estimate(
         wanted_map = MapFile(map_file, threshold, share / 100.0)
     elif threshold is not None:
         raise Refusal("--threshold", threshold, "is for the map: give --map FILE")
+    for file in (svg, map_file):
+        if file:
+            with scratch(file.parent):  # before the work: what can't be written is refused
+                pass
     kinds = [kind for kind in map(compound_kind, specs) if kind]
     if kinds:
         if model:

@@ -250,7 +250,8 @@ def _factor(sensor: SensorTable, channel: Channel, key: str, shown: str) -> floa
         return ratio(own, plain(sensor.unit)) or 1.0
     if not is_signal_unit(own):
         limit = f"is needed, the unit of the numbers: {shown}, says {channel.unit!r}, which is no unit of a signal that"
-        raise Refusal(f"{key}.per", None, f"{limit} unitcad knows", channel.unit)
+        why = f"{limit} unitcad knows; if {key}.scale is for that unit, name it"
+        raise Refusal(f"{key}.per", None, why, channel.unit)
     if sensor.scale == 1.0:
         limit = f"but {shown}, says {own}: declare {key}.scale and {key}.per, or another quantity"
         raise Refusal(f"{key}.unit", sensor.unit, limit)

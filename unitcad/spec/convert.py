@@ -68,10 +68,12 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
 def _by_meaning(refusal: UnknownKey, data: Mapping[str, Any], kind: Any) -> UnknownKey:
     """Return the refusal of a key with the paths that it may mean, if a path of the file means more than its spelling.
 
-    An exact key of another table comes before one of like spelling in its own, a word of a description after it.
+    An exact key of another table comes before one of like spelling in its own, a word of a description after it. The
+    spelling of a key with an entry's number in brackets says nothing.
     """
     path, value = lone_path(refusal.field, refusal.value)
-    close = None if refusal.settled else meant(path, value, kind, data, least=1 if refusal.nearest is None else EXACT)
+    spelt = refusal.nearest is not None and "[" not in refusal.field
+    close = None if refusal.settled else meant(path, value, kind, data, least=EXACT if spelt else 1)
     if not close:
         return refusal
     if close == [refusal.nearest]:

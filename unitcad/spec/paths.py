@@ -43,10 +43,18 @@ def bare(key: str) -> str:
 def meant(path: str, value: object, kind: Any, node: Any, least: int = 1) -> list[str]:
     """Return the paths of a file that a wrong one may mean, for a value that they can take: the likeliest ones.
 
-    A path is compared step by step: `layers[0].wall`, `Layer.0.wall_mm` and `wall` all mean layers.0.wall_mm. `least`
-    is the score from which a path counts: `EXACT`, or less for words that a key or its description has.
+    A path is compared step by step: `layers[0].wall`, `Layer.0.wall_mm` and `wall` all mean layers.0.wall_mm. A number
+    of a list that no entry has stands for every entry. `least` is the score from which a path counts: `EXACT`, or less
+    for words that a key or its description has.
     """
     *tables, key = _steps(path) or [""]
+    without = [step for step in tables if not step.strip("_").isdigit()]
+    found = _likeliest(tables, key, value, kind, node, least)
+    return found if found or without == tables else _likeliest(without, key, value, kind, node, least)
+
+
+def _likeliest(tables: list[str], key: str, value: object, kind: Any, node: Any, least: int) -> list[str]:
+    """Return the likeliest paths for the steps of a typed one: of its tables, and of its key."""
     scores: dict[str, int] = {}
     for known, takes in paths_of(kind, node):
         *above, own = known.split(".")
@@ -79,6 +87,8 @@ def _steps(path: str) -> list[str]:
 def _score(typed: str, key: str, kind: Any) -> int:
     if typed in (key, bare(key)):
         return EXACT + (typed == key)
+    if _same(bare(typed), bare(key)):
+        return EXACT - 1
     words = {word for word in typed.split("_") if word}
     if words and words <= set(bare(key).split("_")):
         return 2
