@@ -220,6 +220,11 @@ def path_seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] 
         return Path(os.path.abspath(path)).as_posix()
 
 
+def with_ending(path: Path, ending: str) -> str:
+    """Return the name of a file nearest to a path that has an ending, such as ".svg"."""
+    return str(path.with_suffix(ending) if path.name else path / f"file{ending}")
+
+
 def names_device(name: str) -> bool:
     """Tell whether a file of this name would be a device on Windows, whatever its ending."""
     return _DEVICE.fullmatch(name.partition(".")[0].rstrip()) is not None

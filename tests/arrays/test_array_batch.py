@@ -34,11 +34,12 @@ def test_a_sweep_makes_arrays_and_goes_on_where_it_ended(tmp_path):
     out = tmp_path / "out"
     made = batch(file, out, only=["unit"], jobs=0, keep_going=True, report=True)
     assert made.summary.ok == 1
-    entries = json.loads((out / "batch.json").read_text())["variants"]
+    folder = made.folder
+    assert folder.parent == out
+    entries = json.loads((folder / "batch.json").read_text())["variants"]
     assert [entry["status"] for entry in entries] == ["ok", "refused"]
     assert "need 16 mm" in entries[1]["reason"]
-    folder = out / entries[0]["folder"]
-    assert (folder / "array.toml").is_file()
+    assert (folder / entries[0]["folder"] / "array.toml").is_file()
     assert (entries[0]["units"], entries[0]["pitch_mm"]) == (2, 18)
     again = batch(file, out, only=["unit"], jobs=0, keep_going=True)
     assert again.summary.resumed == 1

@@ -19,7 +19,7 @@ from unitcad.cli.shared_options import AsJson, Fit, Sets, Specs, finite, with_fi
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, answer_spec, estimate_input, estimate_spec
-from unitcad.files import scratch, write
+from unitcad.files import scratch, with_ending, write
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
 from unitcad.validation import compound_kind, confirm_known, load
@@ -125,6 +125,8 @@ def estimate(
         wanted_map = MapFile(map_file, threshold, share / 100.0)
     elif threshold is not None:
         raise Refusal("--threshold", threshold, "is for the map: give --map FILE")
+    if svg and svg.suffix.lower() != ".svg":
+        raise Refusal("--svg", str(svg), "takes the name of a file that ends in .svg", with_ending(svg, ".svg"))
     for file in (svg, map_file):
         if file:
             with scratch(file.parent):  # before the work: what can't be written is refused
@@ -137,8 +139,6 @@ def estimate(
             raise Refusal("--svg", str(svg), "the plot has levels of units, and an array has crosstalk")
         return load_named(kinds[0].estimate)(specs, with_fit(sets, fit), frequency, details, as_json, wanted_map)
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
-    if svg and svg.suffix.lower() != ".svg":
-        raise Refusal("--svg", str(svg), "takes the name of a file that ends in .svg", str(svg.with_suffix(".svg")))
     if details or as_json:
         for spec in loaded:
             _warn_of_moulds(spec)

@@ -29,7 +29,7 @@ class MapFile:
 
     def __post_init__(self) -> None:
         if self.path.suffix.lower() not in FORMS:
-            nearest = str(self.path.with_suffix(FORMS[0]))
+            nearest = files.with_ending(self.path, FORMS[0])
             raise Refusal("--map", str(self.path), "must end with .svg, .png or .html", nearest)
 
     def of_unit(self, spec: Spec, frequency_hz: float | None = None) -> SkinMap:

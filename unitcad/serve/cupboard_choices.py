@@ -12,6 +12,7 @@ from typing import Any
 import tomlkit
 from msgspec import structs, to_builtins
 
+from unitcad.documents import editable_toml
 from unitcad.serve.form import OF_SPEC
 from unitcad.serve.messages import Group, Held
 from unitcad.validation.cupboard import held, read_cupboard
@@ -64,7 +65,7 @@ def with_entries(text: str, data: Mapping[str, Any], known: Held) -> str:
                 wanted.append((kind, name))
     if not wanted:
         return text
-    document = tomlkit.parse(text)
+    document = editable_toml(text, "spec")
     for kind, name in dict.fromkeys(wanted):
         if kind not in document:
             document.append(kind, tomlkit.table(is_super_table=True))

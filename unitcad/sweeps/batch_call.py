@@ -20,7 +20,7 @@ from unitcad.sweeps.executors import open_executor
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Summary
-from unitcad.sweeps.object_store import is_address
+from unitcad.sweeps.object_store import confirm_address, is_address
 from unitcad.sweeps.run import BatchOptions, Watch, indices_of, run, trim
 from unitcad.sweeps.shard import shard_of
 from unitcad.sweeps.sweep import Sweep, load_sweep
@@ -105,9 +105,10 @@ _MOST_ROWS = 20
 def place(sweep: Sweep, out: str | None) -> tuple[Path, str | None]:
     """Return the folder of a batch's journal and tables, and the address of the store of its variants, if it has one.
 
-    `out` receives the folder, as that of a build does.
+    `out` receives the folder, as that of a build does. Raises UnitcadError for an address of no such store.
     """
-    if is_address(out):
+    if out is not None and is_address(out):
+        confirm_address(out)
         return Path("out") / sweep.slug, f"{out}{'' if str(out).endswith('/') else '/'}{sweep.slug}"
     return Path("out" if out is None else out) / sweep.slug, None
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from unitcad.errors import Missing, Refusal, UnitcadError
 from unitcad.extras import pip_install
-from unitcad.files import write
+from unitcad.files import with_ending, write
 from unitcad.pipeline.manifest import LEVEL_COLUMNS
 from unitcad.report.read_results import cell, in_order, read_batch, swept_columns
 from unitcad.spec import Spec
@@ -28,7 +28,7 @@ def check_table(path: Path) -> None:
     """Raise Refusal for a file of another ending than .csv or .parquet, and Missing for Parquet without pyarrow."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
-        raise Refusal("--table", str(path), "takes a file that ends in .csv or .parquet", str(path.with_suffix(".csv")))
+        raise Refusal("--table", str(path), "takes a file that ends in .csv or .parquet", with_ending(path, ".csv"))
     if ending == ".parquet" and find_spec("pyarrow") is None:
         raise Missing(f"--table {path}: Parquet needs pyarrow: {' '.join(pip_install())} pyarrow")
 

@@ -41,11 +41,16 @@ def is_address(out: object) -> bool:
     return isinstance(out, str) and "://" in out
 
 
+def confirm_address(address: str) -> None:
+    """Raise UnitcadError for another address than s3://bucket/prefix."""
+    if not _ADDRESS.fullmatch(address):
+        raise UnitcadError(f"-o {address}: takes a folder, or s3://bucket/prefix")
+
+
 @cache
 def object_store(address: str) -> ObjectStore:
     """Return the store of an address. Raises UnitcadError for another address than s3://, and without the extra."""
-    if not _ADDRESS.fullmatch(address):
-        raise UnitcadError(f"-o {address}: takes a folder, or s3://bucket/prefix")
+    confirm_address(address)
     return ObjectStore(address)
 
 
