@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+import math
 import os
 import random
 import socket
@@ -150,6 +151,9 @@ OBJ = {
     "large": f"v 1e308 -1e308 1e-320\n{POINTS}f 1 2 3\n",
     "digits": f"v {LONG} 0 0\n{POINTS}f 1 2 3\n",
     "same face": POINTS + "f 1 2 3\n" * 50_000,
+    "round and round": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + f"f {'1 2 3 4 ' * 50_000}\n",
+    "many sides": "".join(f"v {50 * math.cos(i * math.tau / 50_000)} {50 * math.sin(i * math.tau / 50_000)} 0\n" for i in range(50_000)) + f"f {' '.join(map(str, range(1, 50_001)))}\n",
+    "stars": "".join(f"v {(i * 7919) % 1000} {(i * 104729) % 997} {i % 89}\n" for i in range(2000)) + "".join(f"f {' '.join(str((i * (2 * k + 3)) % 1999 + 1) for i in range(1, 2000))}\n" for k in range(100)),
     "one edge": POINTS + "".join(f"v {i} 1 1\n" for i in range(3000)) + "".join(f"f 1 2 {i + 9}\n" for i in range(3000)),
     "one point": "v 0 0 0\n" * 3000 + "".join(f"f {i} {i + 1} {i + 2}\n" for i in range(1, 2999)),
     "crossing": "".join(f"v {i} 0 -9\nv {i} 9 9\nv {i + 9} 0 9\n" for i in range(400)) + "".join(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}\n" for i in range(400)),

@@ -197,8 +197,11 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
             raise TooMany(MOST_PAIRS, "boxes")
         keys.append(np.minimum(i, j).astype(np.uint64) << half | np.maximum(i, j).astype(np.uint64))
     key = np.concatenate(keys)
+    del keys
     key.sort()
-    return np.stack([key >> half, key & np.uint64(0xFFFFFFFF)], axis=1).astype(np.int64)
+    pairs = np.empty((len(key), 2), np.int64)
+    pairs[:, 0], pairs[:, 1] = key >> half, key & np.uint64(0xFFFFFFFF)
+    return pairs
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_step, fl
 from unitcad.meshcheck.geometry.resolution import Resolution, resolution_of
 
 _ALONG = 0.1  # cosine: edges that run more alike are not the two sides of a crack
+_PAIRS = 1 << 18  # pairs of edges looked at together
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 
@@ -325,15 +326,18 @@ def cracks(vertices: Floats, start: Ints, end: Ints, thin: float, tick: Tick) ->
         return np.zeros(n, bool), 0.0
     along = ends[:, 1] - ends[:, 0]
     square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
-    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    facing = np.einsum("ij,ij->i", along[one], along[other]) <= _ALONG * np.sqrt(square[one] * square[other])
-    one, other = one[facing], other[facing]
     away = np.full((3, n), np.inf)
-    for k, point in enumerate((ends[:, 0], ends[:, 1], ends.mean(axis=1))):
-        off = point[one] - ends[other, 0]
-        share = np.clip(np.einsum("ij,ij->i", off, along[other]) / square[other], 0, 1)
-        off -= share[:, None] * along[other]
-        np.minimum.at(away[k], one, np.sqrt(np.einsum("ij,ij->i", off, off)))
+    for at in range(0, len(pairs), _PAIRS):  # of a fine border all at once would take a gigabyte
+        tick()
+        some = pairs[at : at + _PAIRS]
+        one, other = np.concatenate([some, some[:, ::-1]]).T
+        facing = np.einsum("ij,ij->i", along[one], along[other]) <= _ALONG * np.sqrt(square[one] * square[other])
+        one, other = one[facing], other[facing]
+        for k, point in enumerate((ends[:, 0], ends[:, 1], ends.mean(axis=1))):
+            off = point[one] - ends[other, 0]
+            share = np.clip(np.einsum("ij,ij->i", off, along[other]) / square[other], 0, 1)
+            off -= share[:, None] * along[other]
+            np.minimum.at(away[k], one, np.sqrt(np.einsum("ij,ij->i", off, off)))
     width = away.max(axis=0)
     used, ids = np.unique(np.concatenate([start, end]), return_inverse=True)
     border = components(len(used), ids[:n], ids[n:])[ids[:n]]
