@@ -16,8 +16,11 @@ printer without ribs has no such row.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+
+from manifold3d import Manifold
 
 from unitcad import files
 from unitcad.catalogue import Printer
@@ -222,17 +225,24 @@ class Coupon:
 
 def write(printer: Printer, out: Path) -> Path:
     """Write `out`/coupon-<printer>; return that folder. Raises OSError if it can't be written."""
-    folder, coupon, parts = out / f"coupon-{printer.name}", Coupon(printer), []
+    folder, coupon = out / f"coupon-{printer.name}", Coupon(printer)
     folder.mkdir(parents=True, exist_ok=True)
-    for body in coupon.bodies():
-        if body.made == "printed":
-            ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
-            files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
-            parts.append(printing.MeshPart(body.name, body.colour, *ready))
+    printed = [body for body in coupon.bodies() if body.made == "printed"]
+    parts = write_pieces(folder, ((body, realise(body.shape, SEGMENTS)) for body in printed))
     bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
     files.write(folder / "coupon.3mf", printing.content(parts, bed))
     files.write(folder / "coupon.md", coupon.markdown().encode())
     return folder
+
+
+def write_pieces(folder: Path, pieces: Iterable[tuple[Body, Manifold]]) -> list[printing.MeshPart]:
+    """Write an STL of each piece as it is printed; return the parts of their plate. Raises OSError."""
+    parts = []
+    for body, mesh in pieces:
+        ready = print_ready(*arrays(mesh), body.upside_down)
+        files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
+        parts.append(printing.MeshPart(body.name, body.colour, *ready))
+    return parts
 
 
 def _half_up(length: float) -> float:

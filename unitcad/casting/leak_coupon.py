@@ -25,7 +25,7 @@ from typing import Annotated, Any, Literal, cast
 from msgspec import Meta, Struct, structs, to_builtins
 
 from unitcad import files
-from unitcad.casting.coupon import SHARES, Coupon
+from unitcad.casting.coupon import SHARES, Coupon, write_pieces
 from unitcad.casting.figures import FDM_ERROR, print_min
 from unitcad.casting.preparation import foot_mm, in_layers, print_description, slicer_settings
 from unitcad.catalogue import Printer, PrinterEntry, choose, printers
@@ -33,7 +33,6 @@ from unitcad.catalogue.entries import FirstLayer, between, kinds_of
 from unitcad.designs.dimensions import Exit
 from unitcad.errors import Refusal
 from unitcad.export import printing, raster
-from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.base import core, notch, outline, plate_top, plinth
 from unitcad.moulds.cup import SLOPE, ribs, skirt_end, window_section
@@ -413,11 +412,7 @@ class LeakCoupon:
 
     def write(self, folder: Path) -> None:
         """Write the pieces, the plate, the page and the form into a folder. Raises OSError if it can't be written."""
-        parts = []
-        for body in self.printed:
-            ready = print_ready(*arrays(self.moulds.mesh(body)), body.upside_down)
-            files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
-            parts.append(printing.MeshPart(body.name, body.colour, *ready))
+        parts = write_pieces(folder, ((body, self.moulds.mesh(body)) for body in self.printed))
         bed = float(self.printer.bed_x_mm), float(self.printer.bed_y_mm)
         plate = printing.content(parts, bed, slicer_settings(self.moulds), print_description(self.moulds))
         files.write(folder / "leak-coupon.3mf", plate)
