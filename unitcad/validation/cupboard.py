@@ -74,8 +74,14 @@ def cupboard_of(data: Mapping[str, Any]) -> Cupboard:
 
 def read_cupboard(path: str | os.PathLike[str]) -> Cupboard:
     """Return the cupboard of a file. Raises Refusal with the fault's file and line, or UnitcadError."""
+    return _read(path)[1]
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Cupboard]:
+    """Return the data of a cupboard's file, and the cupboard. Raises as `read_cupboard`."""
+    data = read_toml(Path(path))
     try:
-        return cupboard_of(read_toml(Path(path)))
+        return data, cupboard_of(data)
     except Refusal as fault:
         if fault.file is None:
             fault.file, fault.line = os.fspath(path), line_of(files.read_text(path), fault.field)
@@ -87,8 +93,8 @@ def held(path: str | os.PathLike[str]) -> dict[str, dict[str, Any]]:
 
     A kind that its table `at_hand` does not narrow is the whole catalogue. Raises as `read_cupboard`.
     """
-    cupboard = read_cupboard(path)
-    given, at_hand = read_toml(Path(path)).get("at_hand", {}), cupboard.at_hand
+    data, cupboard = _read(path)
+    given, at_hand = data.get("at_hand", {}), cupboard.at_hand
     named = {"materials": at_hand.materials, "motors": at_hand.motors, "printers": (at_hand.printer,)}
     keys = {"materials": "materials", "motors": "motors", "printers": "printer"}
     found = dict[str, dict[str, Any]]()
