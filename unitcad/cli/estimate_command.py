@@ -142,8 +142,10 @@ def estimate(
     if details or as_json:
         for spec in loaded:
             _warn_of_moulds(spec)
+    answers = [answer_spec(spec, frequency) for spec in loaded] if svg or not as_json else []
+    names = names_of(specs, loaded)
     if svg:
-        write(svg, level_plot(names_of(specs, loaded), [answer_spec(spec, frequency) for spec in loaded]).encode())
+        write(svg, level_plot(names, answers).encode())
     if as_json:
         with progress("estimate") as stage:
             estimates = [estimate_spec(spec, models, frequency, say=stage) for spec in loaded]
@@ -153,13 +155,11 @@ def estimate(
         return
 
     asked = [tuple(models or spec.estimate.models) for spec in loaded]
-    answers = [answer_spec(spec, frequency) for spec in loaded]
-    named = [*zip(names_of(specs, loaded), answers, strict=True)]
     several = len(loaded) > 1
     if several:
         from unitcad.cli.tables import print_table
 
-        print_table(comparison(named))
+        print_table(comparison([*zip(names, answers, strict=True)]))
     last: dict[str, Any] | None = None
     for spec, wanted, one in zip(loaded, asked, answers, strict=True):
         data = None
