@@ -382,18 +382,19 @@ def _proper(local: Floats, normal: Floats, fans: Ints, least: Floats) -> Bools:
 def _concave(local: Floats, normal: Floats, fan: Ints) -> Ints:
     """Return triangles of one polygon by manifold3d; the fan if its corners are on a line or it crosses itself.
 
-    A hole that is joined to the outline has points twice. More often than that a polygon runs over itself, which takes
-    manifold3d minutes. Raises `Unreadable` (F011) if one of many corners crosses itself: all its triangles meet.
+    A hole that is joined to the outline has points twice. More often than that a polygon runs over itself; with many
+    corners that takes manifold3d minutes. Raises `Unreadable` (F011) if one of many corners crosses itself: all its
+    triangles meet.
     """
     drop = int(np.argmax(np.abs(normal)))
     if not abs(normal[drop]) > 0:
         return fan
     flat = local[:, [(drop + 1) % 3, (drop + 2) % 3]] * [np.sign(normal[drop]), 1]
-    cut = fan
-    if len(local) <= 2 * len(np.unique(local, axis=0)):
+    many, cut = len(local) > _MOST_CROSSING, fan
+    if not many or len(local) <= 2 * len(np.unique(local, axis=0)):
         triangles = np.asarray(triangulate([flat]))
         cut = triangles if triangles.shape == fan.shape else fan
-    if len(local) > _MOST_CROSSING:
+    if many:
         one, other = (flat[cut[:, k]] - flat[cut[:, 0]] for k in (1, 2))
         areas = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
         if np.abs(areas).sum() > 1.5 * abs(areas.sum()):
