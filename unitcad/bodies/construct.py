@@ -16,6 +16,7 @@ from unitcad.bodies.parted import Impossible, Mould, closed_cups, draw, inside
 from unitcad.bodies.search import Way, ways
 from unitcad.checks import check_geometry, strains
 from unitcad.checks.finding import MouldFinding, at_least, at_most
+from unitcad.checks.overlap import OF_UNIT
 from unitcad.checks.strain import CAPTIVE
 from unitcad.designs import design_of
 from unitcad.designs.design import Tooling
@@ -36,8 +37,6 @@ MOST_DRAWN = 8
 MOST_STRETCHED = 100.0
 """Strain of a peel up to which a way is taken, percent: what the stiffest shipped silicones bear with a margin of 3."""
 _AS_DRAWN = "as drawn, a cup that lifts off: "
-_OF_THE_UNIT = "unit: "
-"""Start of the place of a finding about the unit itself, which stays whichever mould is taken."""
 _OF_THE_BODY = ("design", "moulds.pour")
 """Fields of refusals for which another way may help."""
 SAID = 4
@@ -57,7 +56,7 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     tried = [_AS_DRAWN]
     if isinstance(first, Tooling):
         failed = _failed(spec, planned(first))
-        if not failed or any(finding.where.startswith(_OF_THE_UNIT) for finding in failed):
+        if not failed or any(finding.where.startswith(OF_UNIT) for finding in failed):
             return first
         tried[0] += _said(failed[0])
     elif first.field in _OF_THE_BODY:

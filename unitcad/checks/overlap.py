@@ -25,6 +25,9 @@ from unitcad.shape import Shape
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.text import number
 
+UNIT = "unit"
+OF_UNIT = f"{UNIT}: "
+"""Start of the place of a finding about the unit itself, which stays whichever mould is taken."""
 POCKET = 0.05
 """Depth to which the facets of a pocket may reach into the bought part in it, mm: soft silicone gives way."""
 OVERLAP = 1e-6
@@ -44,14 +47,14 @@ def of_unit(moulds: MouldSet) -> list[MouldFinding]:
     there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
     wires = [body for body in moulds.unit if body.kind == "wire"]
     round_parts = {body.name: GRID + deviation(body.shape, moulds.segments) for body in wires}
-    found = _findings("unit", there, moulds.facets, {}, round_parts)
+    found = _findings(UNIT, there, moulds.facets, {}, round_parts)
     return [finding if finding.ok else _explained(moulds, finding) for finding in found]
 
 
 def _explained(moulds: MouldSet, found: MouldFinding) -> MouldFinding:
     """Return a finding of the unit with its remedy; one of a pocket that only its facets make narrow passes."""
     bodies = {body.name: body for body in moulds.unit}
-    pair = [bodies.get(name) for name in found.where.removeprefix("unit: ").split(" and ")]
+    pair = [bodies.get(name) for name in found.where.removeprefix(OF_UNIT).split(" and ")]
     bought = next((body for body in pair if body and body.made == "bought"), None)
     cast = next((body for body in pair if body and body.made == "cast"), None)
     if not (bought and cast and is_custom(moulds.spec.design)):
