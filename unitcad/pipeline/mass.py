@@ -104,11 +104,9 @@ def _density(spec: Spec, body: Body, volume_mm3: float) -> tuple[float, str]:
         motor = motors(spec.motors)[spec.motor.part] if spec.motor.part else None
         kg = motor_mass(spec, motor)
         return 1e3 * kg.middle / volume_mm3, kg.note or "mass of the catalogue's motor"
-    if body.step is not None and body.made == "cast":
-        silicone = materials(spec.materials)[spec.layers[body.step - 1].material]
-        return float(silicone.density_g_cm3) / 1e3, f"{silicone.name}: {silicone.density_g_cm3.source}"
-    if body.kind == "film":
-        silicone = materials(spec.materials)[spec.layers[-1].material]
+    step = body.step if body.made == "cast" else None
+    if step is not None or body.kind == "film":  # a film without a pour is of the last layer's silicone
+        silicone = materials(spec.materials)[spec.layers[-1 if step is None else step - 1].material]
         return float(silicone.density_g_cm3) / 1e3, f"{silicone.name}: {silicone.density_g_cm3.source}"
     assumed = WIRE_G_CM3 if body.kind == "wire" else CIRCUIT_G_CM3
     return assumed / 1e3, f"assumed: {assumed:g} g/cm3"
