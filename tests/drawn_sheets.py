@@ -31,6 +31,17 @@ def cells(page):
     }
 
 
+def table(page):
+    """Return (x, y, size) of each row of the tables of holes, by its name."""
+    texts = [mark for mark in page.marks if isinstance(mark, paper.Text) and mark.anchor == "start"]
+    lines = {}
+    for text in sorted(texts, key=lambda text: text.at[0]):
+        lines.setdefault(round(text.at[1], 3), []).append(text.text)
+    rows = [row[i : i + 4] for row in lines.values() for i in range(len(row) - 3)]
+    found = [row for row in rows if re.fullmatch(r"(-?\d+\.\d\d)(-?\d+\.\d\d)(Ø.*|.* x .*)", "".join(row[1:]))]
+    return {name: (float(x), float(y), size) for name, x, y, size in found}
+
+
 def faults(page):
     """Yield texts that touch a line, another text, or the frame's outside."""
     segments = paper.segments(page.marks)

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from tests.arrays.made_arrays import made
-from tests.drawn_sheets import ISO_5455, allowed, cells, faults, measured, number
+from tests.drawn_sheets import ISO_5455, allowed, cells, faults, measured, number, table
 from unitcad.arrays.array_file import array_hash
 from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_sheet import array_sheets, without_sheet
@@ -43,7 +43,10 @@ def test_a_caliper_finds_lengths_and_places(name):
         assert sheet.datum == pytest.approx(bounds(solid)[:2], abs=0.01)
         inside = [p for p in moulds.array.places if hit_box(bounds(solid), p)]
         assert [hole.name for hole in sheet.holes][: len(inside)] == [p.name for p in inside] * bool(sheet.holes)
+        page, *_ = drawing.pages([sheet])
         for hole in sheet.holes:
+            at = hole.x - bounds(solid)[0], hole.y - bounds(solid)[1]
+            assert table(page)[hole.name][:2] == pytest.approx(at, abs=0.01)
             assert on_mesh(solid, hole, moulds.segments), (body.name, hole)
     units = {place.name: place for place in moulds.array.places}
     assert {hole.name for hole in patch.holes if hole.name in units} == set(units)
@@ -95,5 +98,15 @@ def test_the_patch_is_measured_from_its_edges():
     assert patch.front.lengths[-1].value == pytest.approx(
         boxes[:, 5].max() - boxes[:, 2].min(), abs=0.12
     )  # the circuit
+    (page,) = drawing.pages([patch])
+    motors = {
+        body.name.partition("-")[0]: bounds(realise(body.shape, 64))
+        for body in patch_bodies(moulds.array)
+        if body.kind == "motor"
+    }
+    for name, box in motors.items():
+        at = (box[0] + box[3]) / 2 - x0, (box[1] + box[4]) / 2 - y0
+        assert table(page)[name][:2] == pytest.approx(at, abs=0.01)
+    assert len(motors) == 9
     assert [(hole.name, hole.size) for hole in patch.holes][-2:] == [("S1", "3 x 26"), ("S2", "3 x 26")]
     assert [note.text for note in patch.plan.notes] == ["4× R10"]
