@@ -5,7 +5,7 @@ from __future__ import annotations
 import copyreg
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 
 from unitcad.text import some, toml
