@@ -14,7 +14,7 @@ import uvicorn
 
 from unitcad.documents import parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.files import read_text, sha256
+from unitcad.files import read_text, scratch, sha256
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
@@ -22,7 +22,7 @@ from unitcad.rooms import expect_none_but
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, application
 from unitcad.serve.cupboard_choices import held_in
-from unitcad.serve.jobs import RESULTS
+from unitcad.serve.jobs import RESULTS, temporary_folder
 from unitcad.serve.messages import ALL, Source
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
@@ -56,6 +56,9 @@ def serve(
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
         out = batch.resolve().with_name(f"{batch.resolve().name}-live")
+    elif out != DEFAULT_OUT:
+        with temporary_folder(out), scratch(out):  # a folder that can't be written is refused before the page opens
+            pass
     for folder in (out, *out.glob(f"sweep-*/{RESULTS}")):
         with contextlib.suppress(OSError):  # it is not there, or not to be changed
             clear_leftovers(folder)
