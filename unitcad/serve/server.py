@@ -14,7 +14,7 @@ import uvicorn
 
 from unitcad.documents import parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.files import read_text, scratch
+from unitcad.files import read_text, scratch, sha256
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
@@ -63,7 +63,7 @@ def serve(
         with contextlib.suppress(OSError):  # it is not there, or not to be changed
             clear_leftovers(folder)
     path = named_file(source or default_template(), every_template(), "spec", WrongArgument)
-    text = read_text(path)
+    known, text = sha256(path), read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
     own = source is not None and is_path(source) and source not in custom_templates()
     folder = path.parent.resolve() if own else Path.cwd()
@@ -83,6 +83,7 @@ def serve(
         live = Live(
             text, path.name if own else f"{path.stem}.toml", folder, out,
             [source for source in trusted if source.named], starts, token, bound, batch, held,
+            known if own and not is_variant(folder) else "",
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
         config = uvicorn.Config(
