@@ -115,7 +115,8 @@ class Visit:
             """() => [...document.querySelectorAll("button, input, select, textarea, details:not([open]), h2, h3, h4")]
               .filter((node) => node.getClientRects().length && node.checkVisibility())
               .filter((node) => !/^H/.test(node.tagName) || getComputedStyle(node).breakAfter !== "avoid"
-                || (node.parentElement.innerText.trim() === node.innerText.trim() && !node.parentElement.querySelector("canvas, img, svg, .plot")))
+                || (node.parentElement.innerText.trim() === node.innerText.trim()
+                  && !node.parentElement.querySelector("canvas, img, svg, .plot")))
               .map((node) => node.outerHTML.slice(0, 90))"""
         )
 
