@@ -33,7 +33,7 @@ def test_answers_are_those_of_the_commands(server, name):
     judged = server.ask(text, "moulds")
     assert judged["checks"] == json.loads(json.dumps([finding.as_dict() for finding in check_moulds(moulds)]))
     assert base64.b64decode(judged["model"]["moulds"]) == glb_content(moulds, moulds.plan.tools)
-    assert len(judged["lines"]) == 2
+    assert [*judged["lines"]][-2].startswith("print ")
     if name == "encapsulating":
         assert server.ask(text, "estimate")["estimate"] == json.loads(json.dumps(estimate_spec(spec)))
 

@@ -136,7 +136,10 @@ def list_(
     ] = None,
     cupboard: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Only the entries that a file of what you own names, and its own. A kind it does not name: all."),
+        typer.Option(
+            metavar="FILE",
+            help="Only entries that a file of what you own names, and its own. A kind not named: all.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
