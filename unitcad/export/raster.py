@@ -299,7 +299,8 @@ def _sides(corners: np.ndarray) -> _Sides:
     order = np.argsort(y0, axis=1, kind="stable")
     opposite = (order - 1) % 3 + 3 * np.arange(len(corners))[:, None]  # the number of the side opposite a corner
     above, long, below = np.ascontiguousarray(opposite.T)
-    return _Sides(table, *np.ascontiguousarray(np.take_along_axis(y0, order, axis=1).T), long, below, above)
+    least, middle, highest = np.ascontiguousarray(np.take_along_axis(y0, order, axis=1).T)
+    return _Sides(table, least, middle, highest, long, below, above)
 
 
 def _span(sides: _Sides, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

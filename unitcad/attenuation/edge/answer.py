@@ -177,7 +177,9 @@ def _wider(lead: Lead, variant: EstimateInput) -> list[str]:
     if all(number(level * (end / level) ** share, 2) == number(end, 2) for end in (low, high)):
         return []
     felt = [name for name, more in added.items() if whole - np.sqrt(max(whole**2 - more, 0.0)) > _NOTICED * whole]
-    return sorted(felt, key=lambda name: -added[name])
+    of_nobody = "silicones (the key like names the one of the catalogue, if it is one)"
+    words = {"silicones": of_nobody} if any(layer.other for layer in variant.layers) else {}
+    return [words.get(name, name) for name in sorted(felt, key=lambda name: -added[name])]
 
 
 def _source(lead: Lead, variant: EstimateInput, fit: LabFit | None) -> Source:
