@@ -7,17 +7,12 @@ import pytest
 from faulty_sets import set_of
 from manifold3d import CrossSection
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.arrayed import said_of_unit
-from unitcad.arrays.patch import patch_moulds
 from unitcad.casting import preparation
 from unitcad.checks import mould_checks
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import bounds
-from unitcad.moulds.heights import as_printed, height_warnings, unit_heights
+from unitcad.moulds.heights import height_warnings, unit_heights
 from unitcad.pipeline.summary import unit_summary
-from unitcad.serve.messages import Answer
-from unitcad.serve.unit_answers import ANSWERS
 from unitcad.spec.layers import Layers
 from unitcad.validation import load
 
@@ -112,40 +107,13 @@ def test_the_first_layer_stands_beside_the_layers():
 
 @pytest.mark.parametrize(("given", "line"), [((), "4.6 mm high (drawn 4.61), caps 1.2 and 1.2"), (
     ("moulds.first_layer_mm=0.35",), "4.55 mm high (drawn 4.61), caps 1.15 and 1.2")])  # fmt: skip
-def test_terminal_and_live_page_say_the_heights_that_the_printer_makes(given, line):
+def test_the_terminal_says_the_heights_that_the_printer_makes(given, line):
     moulds = set_of("encapsulating", *given)
     manifest = {"outputs": ["unit", "moulds"], "casting": None, "estimate": None, "mould_checks": [], "steps": [],
         "parts": [{"role": "unit", "made": "cast", "bbox_mm": [-7, -7, 0, 7, 7, 4.61], "name": "layer1", "material": None}],
         "name": "one", "check": {"errors": 0, "warnings": 0, "findings": []}}  # fmt: skip
     first = next(unit_summary(moulds, Path("none"), manifest))
     assert line in first, "without a casting too"
-    answer = Answer(text="")
-    ANSWERS["moulds"](moulds.spec, answer)
-    assert answer.lines[0] == f"The unit comes out {line}."
-    assert answer.warnings == height_warnings(moulds)
-
-
-def test_an_array_names_the_keys_of_its_file():
-    """The suggestion without "unit." was an unknown key."""
-    said = height_warnings(patch_moulds(load_array("forearm-patch", [COARSE])))
-    better = [line.split("; ")[1].split(" would")[0].replace(" = ", "=") for line in said]
-    assert better[0].startswith("unit.layers.0.cap_mm=")
-    assert height_warnings(patch_moulds(load_array("forearm-patch", [COARSE, *better]))) == []
-
-
-def test_a_placed_unit_of_another_kind_is_named_by_its_place():
-    given = {"array": "pockets", "layout": {"kind": "grid", "columns": 2, "rows": 1, "pitch_mm": 24.0}, "name": "two",
-             "unit": "encapsulating", "moulds": {"first_layer_mm": 0.35}, "sheet": {"thickness_mm": 2.0},
-             "place": [{"at": [2, 1], "unit": "no-fpcb"}]}  # fmt: skip
-    array = load_array(given)
-    said = [line for unit in array.units for line in said_of_unit(array, unit).values()]
-    assert any("; unit.layers.0.cap_mm = " in line for line in said)
-    assert any("; place.0.unit.layers.0.cap_mm = " in line for line in said)
-
-
-def test_a_curved_array_has_caps_only():
-    assert as_printed(patch_moulds(load_array("sleeve-curved"))) == "cap 1.2 mm (drawn 1.25)"
-    assert as_printed(patch_moulds(load_array("forearm-pockets"))) == ""
 
 
 def test_a_first_layer_of_nothing_is_refused():
