@@ -114,7 +114,7 @@ def test_layers_fill_the_body_and_are_as_thick_as_asked_for(tmp_path):
     assert again == spec
     assert spec_hash(again) == spec_hash(spec)
     thick = load(tmp_path / "spec.toml", {"layers.1.thickness_mm": 2})
-    assert solids_of(thick)["layer1"].bounds[1, 2] == pytest.approx(13, abs=0.03)
+    assert solids_of(thick)["layer1"].bounds[1, 2] == pytest.approx(13, abs=0.07)
 
 
 def test_a_hollow_is_left_and_a_floor_is_under_the_motor(tmp_path):
@@ -138,7 +138,11 @@ def test_a_hollow_is_left_and_a_floor_is_under_the_motor(tmp_path):
         ({"diameter_mm": 14}, "diameter_mm", "leave it out"),
         ({"layers.0.wall_mm": 1}, "layers.0.wall_mm", "thickness_mm in its place"),
         ({"layers.1": {"material": "ecoflex-00-30"}}, "layers.1.thickness_mm", "is required"),
-        ({"layers.1.thickness_mm": 7.5, "motor": False}, "layers.1.thickness_mm", "nothing of the body is 7.5 mm under"),
+        (
+            {"layers.1.thickness_mm": 7.5, "motor": False},
+            "layers.1.thickness_mm",
+            "nothing of the body is 7.5 mm under",
+        ),
         ({"layers.0.thickness_mm": 6, "motor": False}, "layers.0.thickness_mm", "no hollow is left"),
         ({"layers.0.thickness_mm": 1, "motor.at": [3, 2, 5], "wires.diameter_mm": 0.5}, "wires", "by its mouth"),
         ({"layers.0.thickness_mm": 1}, "motor.at", "is required in a hollow body"),

@@ -138,6 +138,7 @@ def _check_body_keys(raw: RawSpec) -> None:
     for i, layer in enumerate(raw.layers):
         if layer.thickness_mm is UNSET and i != inmost:
             limit = "is required: only the innermost layer by offset does without, and fills the body"
+            limit = 'is required with bottom = "floor": that of the floor' if inmost > i else limit
             raise Refusal(f"layers.{i}.thickness_mm", None, limit)
 
 
@@ -407,8 +408,10 @@ def _bonds(spec: Spec) -> list[str]:
 
 
 def _leads(spec: Spec) -> list[str]:
-    drawn = is_body_file(spec.design)
-    if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn):
+    drawn = is_body_file(spec.design) and not spec.body
+    if spec.body and spec.layers[0].thickness_mm is not UNSET and spec.body.bottom == "open":
+        return []  # by the mouth of the hollow
+    if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn or spec.body):
         return []
     offer = "draw a notch for them" if drawn else "add a table [wires] with diameter_mm, or [fpcb]"
     return [f"no way out for the motor's leads: they run between unit and skin; {offer}"]
