@@ -5,9 +5,8 @@ from __future__ import annotations
 import copyreg
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
-from types import MappingProxyType
 
 from unitcad.text import some, toml
 
@@ -119,7 +118,7 @@ class UnknownKey(Refusal):
     """A key that its table does not have; `nearest` is the whole path of the closest one that it has.
 
     `meant`: every path that it may mean; `root`: its own path, if `field` goes on to the only value below it;
-    `settled`: the key was one of an earlier version, so nothing else is meant.
+    `settled`: the limit says what to do, so nothing else is meant.
     """
 
     def __init__(
@@ -163,20 +162,20 @@ def unknown_key(
     value: object,
     known: Iterable[str],
     lists: str = "",
-    removed: Mapping[str, str] = MappingProxyType({}),
+    instead: str = "",
 ) -> UnknownKey:
     """Return a refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
 
-    The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any. `removed`:
-    for each key of an earlier version the key that took its place, or a sentence of what to do.
+    The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any. `instead`:
+    the key that took its place, or a sentence of what to do.
     """
     table, _, key = field.rpartition(".")
     known = list(known)
-    if after := removed.get(key):
-        if after in known:
-            path = f"{table}.{after}" if table else after
-            return UnknownKey(field, value, f"unknown key; {after} took its place", path, settled=True)
-        return UnknownKey(field, value, f"unknown key; it went: {after}", settled=True)
+    if instead in known:
+        path = f"{table}.{instead}" if table else instead
+        return UnknownKey(field, value, f"unknown key; {instead} took its place", path, settled=True)
+    if instead:
+        return UnknownKey(field, value, f"unknown key; {instead}", settled=True)
     close = get_close_matches(key, known, n=len(known) or 1, cutoff=_ALIKE)
     # Among equals the table's first: bed_x_mm before bed_z_mm.
     best = max(

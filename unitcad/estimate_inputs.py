@@ -208,6 +208,7 @@ def silicone_layer(material: Material, wall: float, frequency: Quantity, slow: b
         tan_delta=_quantity(material.loss_factor),
         place=place.at,
         doubt=place.doubt,
+        other=(material.like or material.name) not in materials(),
     )
 
 

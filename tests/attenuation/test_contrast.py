@@ -60,6 +60,14 @@ def test_the_case_of_ones_own_pulls():
     assert ends(unit(("soft", "stiff"), own=own(**typed))) == pytest.approx([0.027, 0.060], abs=0.0005)
 
 
+def test_a_silicone_without_a_name_is_asked_for_it():
+    silicones = {name: {"quasistatic_modulus_kpa": kpa} for name, kpa in (("soft", 26.13), ("stiff", 126.7))}
+    made = {name: {"density_g_cm3": 1.07, **one} for name, one in silicones.items()}
+    assert "the key like names" in answer_spec(unit(("soft", "stiff"), own=made)).wider[0]
+    named = {name: {"like": "ecoflex-00-30", **one} for name, one in silicones.items()}
+    assert answer_spec(unit(("soft", "stiff"), own=named)).wider[0] == "silicones"
+
+
 def test_fifteen_to_eighteen_kilopascal():
     """Upper ends of 6.0, 14, 41 and 53 % are the cliff that this replaces."""
     found = [ends(unit(("mine", NAMES[3]), own=own(mine=(NAMES[0], kpa))))[1] for kpa in (15, 16, 17, 18)]

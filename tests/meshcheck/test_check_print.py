@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from manifold3d import CrossSection
+from manifold3d import CrossSection, FillRule
 from shapes import CUBE_CORNERS, CUBE_FACES, box, fin, finding, obj, prism, stl, turned
 from test_check_depth import pieces
 from test_check_overlap import BOW_TIE, pentagram
 
 from unitcad.meshcheck import check_bytes
 from unitcad.meshcheck.geometry.disputed import deepest
-from unitcad.meshcheck.geometry.layers import Slicer
+from unitcad.meshcheck.geometry.layers import Slicer, eroded
 from unitcad.meshcheck.geometry.mesh import weld_exact
 from unitcad.meshcheck.geometry.rays import winding_numbers
 from unitcad.meshcheck.geometry.topology import edges_of
@@ -79,6 +79,23 @@ def test_the_largest_circle_of_a_needle_ends():
     assert deepest(needle)[0] < 1e-3
     for side in (1e-6, 3e-8):
         assert deepest(CrossSection.square([5, side]))[0] == pytest.approx(side / 2, rel=0.03, abs=1e-7)
+
+
+def test_many_pieces_are_eroded_as_they_are_at_once():
+    """Of some hundred pieces of all sizes one is a ring with an island and a dot in it, one a hole's neighbour."""
+    rng = np.random.default_rng(1)
+    strips = []
+    for angle, shift in zip(rng.uniform(0, np.pi, 30), rng.normal(0, 0.3, (30, 2)), strict=True):
+        strip = CrossSection.square([18, 0.6], center=True).rotate(np.degrees(angle)).translate(shift.tolist())
+        strips += strip.to_polygons()
+    ring = CrossSection.square([8, 8]) - CrossSection.square([6, 6]).translate([1, 1])
+    inner = CrossSection.square([3, 3]).translate([2, 2]) + CrossSection.square([0.1, 0.1]).translate([6, 6])
+    area = CrossSection(strips, FillRule.EvenOdd) + (ring + inner).translate([-4, 20])
+    assert area.num_vert() > 2000
+    for radius in (0.001, 0.02, 0.15, 0.9):
+        one, other = eroded(area, radius), area.offset(-radius)
+        assert other.area() > 0.1
+        assert ((one - other) + (other - one)).area() < 1e-6
 
 
 def test_loose_ends_are_joined_to_the_nearest():

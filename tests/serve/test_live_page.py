@@ -68,6 +68,97 @@ def test_a_part_fills_the_motor_s_fields_and_the_pieces_lie_side_by_side(live):
     assert live.page.input_value('input[name="apart"]') == "0"
 
 
+IN_SIGHT = """(node) => {
+  const { top, bottom } = node.getBoundingClientRect();
+  return top >= document.querySelector(".top").getBoundingClientRect().bottom - 1 && bottom <= innerHeight + 1;
+}"""
+
+
+def test_a_reason_comes_to_the_person_and_the_chip_leads_to_it(browser, server):
+    live = Live(browser, server, 390, 700)
+    fault = live.page.locator('.field[data-path="layers.0.wall_mm"] .refusal')
+    live.choose(WALL, "9")
+    assert fault.evaluate(IN_SIGHT)
+    live.page.evaluate("() => { document.activeElement.blur(); window.scrollTo(0, document.body.scrollHeight); }")
+    assert not fault.evaluate(IN_SIGHT)
+    live.page.get_by_role("link", name="1 value is refused").click()
+    assert fault.evaluate(IN_SIGHT)
+    assert live.page.evaluate("() => document.activeElement.name") == "layers.0.wall_mm"
+    # A text that was refused by something else than a field in sight, as by undo and redo.
+    for button in ("Undo", "Redo"):
+        live.page.evaluate("() => window.scrollTo(0, 0)")
+        live.pressed(live.page.get_by_role("button", name=button))
+    assert fault.evaluate(IN_SIGHT)
+    # A picked design tells its changes where it was picked.
+    live.pressed(live.page.get_by_role("button", name="Undo"))
+    count = len(live.timings())
+    live.page.select_option('select[name="design"]', "embedded")
+    live.until(lambda: len(live.timings()) > count)
+    live.settled()
+    told = live.page.locator('.field[data-path="design"] #also')
+    assert told.inner_text().startswith("Left out: layers.0.cap_mm and layers.1.cap_mm.")
+    assert told.evaluate(IN_SIGHT)
+    assert "cap_mm" not in live.page.input_value("#text")
+    live.pressed(live.page.get_by_role("button", name="Undo"))
+    assert live.page.input_value("#text").count("cap_mm") == 2
+    live.close()
+
+
+def test_every_change_is_one_step_of_undo(live):
+    name = '[name="name"]'
+    # Two changes at once, sooner than the first is answered.
+    live.page.evaluate(
+        """() => {
+          for (const [name, value] of [["layers.0.wall_mm", "1.3"], ["layers.1.wall_mm", "1.2"]]) {
+            const input = document.querySelector(`input[name="${name}"]`);
+            input.value = value;
+            input.dispatchEvent(new Event("input"));
+          }
+        }"""
+    )
+    live.until(lambda: "wall_mm = 1.2\n" in live.page.input_value("#text").replace(" #", "\n"))
+    live.settled()
+    live.page.locator(WALL).press("Control+z")
+    live.until(lambda: live.page.input_value('input[name="layers.1.wall_mm"]') == "1.25")
+    assert live.page.input_value(WALL) == "1.3"
+    live.start_from("embedded")
+    assert live.page.input_value("#file-name") == "embedded.toml"
+    assert "Other values than before: " in live.page.inner_text("#also")
+    # The name that is typed has its own undo, and the text the page's.
+    live.page.fill("#file-name", "x")
+    live.page.locator("#file-name").press("Control+z")
+    assert live.page.input_value(name) == "embedded"
+    live.page.click("text=As TOML text")
+    live.page.locator("#text").press("Control+z")
+    live.until(lambda: live.page.input_value(name) == "encapsulating")
+    live.settled()
+    assert "1.3" in live.page.input_value("#text")
+
+
+def test_the_file_that_was_opened_is_saved_without_a_question_until_it_changes(browser, tmp_path, text):
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with serving(tmp_path, "mine.toml") as own:
+        visit = Live(browser, own)
+        for wall in ("1.3", "1.35"):
+            visit.choose(WALL, wall)
+            visit.page.click("text=Save spec")
+            visit.until(lambda: "Saved as" in visit.page.inner_text("#do"))
+            assert f"wall_mm = {wall}" in file.read_text()
+            visit.page.reload()
+            visit.page.wait_for_selector("html[data-ready=yes]")
+        file.write_text(text + "# theirs\n")
+        visit.choose(WALL, "1.4")
+        visit.page.click("text=Save spec")
+        visit.until(lambda: "was changed on disk" in visit.page.inner_text("#do"))
+        assert file.read_text().endswith("# theirs\n")
+        visit.page.click("text=Replace it")
+        visit.until(lambda: "Saved as" in visit.page.inner_text("#do"))
+        assert "wall_mm = 1.4" in file.read_text()
+        visit.context.close()
+        assert visit.errors == []
+
+
 def test_form_and_text_are_in_step_and_changes_are_undone(live):
     live.page.click("text=As TOML text")
     live.choose(WALL, "1.4")
@@ -264,6 +355,9 @@ def test_save_and_build_from_the_page(browser, tmp_path):
         assert any("drawing the" in each or "checking the moulds" in each for each in words), words
         assert f"In {tmp_path / 'out'}/" in visit.page.inner_text(".job")
         assert "The build is done." in visit.page.inner_text(".job")
+        assert visit.page.locator(".job").first.evaluate(IN_SIGHT)
+        visit.page.evaluate("() => window.scrollTo(0, 0)")
+        assert "/files/" in visit.page.get_by_role("link", name="open the result").get_attribute("href")
         with visit.context.expect_page() as opened:
             visit.page.click("text=Open its page")
         result = opened.value

@@ -1,21 +1,28 @@
 """What a refusal offers is accepted, and stands at the field that was changed."""
 
+import tomllib
+
 import pytest
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.arrays.array_file import array_templates
 from unitcad.documents import read_toml
 from unitcad.serve.answers import answered
-from unitcad.serve.form import groups
+from unitcad.serve.form import edited, groups
 from unitcad.serve.messages import Ask, Edit, Trusted
 from unitcad.serve.server import _trusted_source
 from unitcad.validation import custom_templates, templates
+from unitcad.validation.suggestions import numbers
+
+
+def text_of(template):
+    """The text of a template."""
+    return (templates() | array_templates())[template].read_text("utf-8")
 
 
 def faults(template, edits, since, what="unit"):
     """The faults of a template after edits."""
-    text = (templates() | array_templates())[template].read_text("utf-8")
-    return answered(Ask(text=text, edits=edits, since=since, what=what), Trusted()).faults
+    return answered(Ask(text=text_of(template), edits=edits, since=since, what=what), Trusted()).faults
 
 
 @pytest.mark.parametrize(
@@ -76,13 +83,46 @@ def test_a_key_that_has_to_go_is_offered_to_be_left_out():
     ],
 )
 def test_keys_that_have_to_go_together_are_offered_to_be_left_out_together(template, path, before, now, gone):
-    edit = Edit(path=path, value=now)
-    for fault in faults(template, [edit], [Edit(path=path, value=before)]):
+    text = text_of(template).replace(f'{path.rpartition(".")[2]} = "{before}"', f'{path.rpartition(".")[2]} = "{now}"')
+    for fault in answered(Ask(text=text, since=[Edit(path=path, value=before)]), Trusted()).faults:
         assert fault.leave_out
         assert sorted([fault.field, *fault.together]) == gone
         # And back to the word that was there.
         assert (fault.at, fault.at_nearest) == (path, before)
-    assert faults(template, [edit, *(Edit(path=each, remove=True) for each in gone)], []) == []
+    assert faults(template, [Edit(path=path, value=now), *(Edit(path=each, remove=True) for each in gone)], []) == []
+
+
+@pytest.mark.parametrize(
+    ("template", "path", "now", "also"),
+    [
+        ("encapsulating", "design", "embedded", "Left out: layers.0.cap_mm and layers.1.cap_mm."),
+        ("embedded", "design", "encapsulating", "Set: layers.0.cap_mm = 1.25 and layers.1.cap_mm = 1.25."),
+        ("hex-19", "layout.kind", "grid", "Left out: layout.rings. Set: layout.columns = 3 and layout.rows = 3."),
+        ("hex-19", "layout.kind", "list", "Left out: layout.rings and layout.pitch_mm. Set: layout.points_mm (19 entries)."),
+        ("forearm-patch", "array", "pockets", "Left out: circuit."),
+        ("forearm-patch", "unit", "motor-10mm", "Set: layout.pitch_mm = 21."),
+    ],
+)  # fmt: skip
+def test_a_picked_design_makes_the_changes_that_it_needs_and_names_them(template, path, now, also):
+    answer = answered(Ask(text=text_of(template), edits=[Edit(path=path, value=now)]), Trusted())
+    assert (answer.faults, answer.also, answer.picked) == ([], also, path)
+    # The text has them: it is accepted as it is, and every number that is not named is as it was.
+    assert answered(Ask(text=answer.text), Trusted()).faults == []
+    before, after = (dict(numbers(tomllib.loads(each))) for each in (text_of(template), answer.text))
+    assert all(key in also or key.startswith("layout.points_mm") for key in before.keys() ^ after.keys())
+    assert all(before[key] == after[key] or key in also for key in before.keys() & after.keys())
+
+
+def test_a_pick_changes_nothing_in_a_text_that_was_refused_before_or_that_can_t_have_it():
+    refused = text_of("encapsulating").replace("wall_mm = 1.25", "wall_mm = 0.1", 1)
+    for text, edit in (
+        (refused, Edit(path="design", value="embedded")),
+        (text_of("forearm-patch"), Edit(path="unit", value="no-fpcb")),
+        (text_of("encapsulating"), Edit(path="design", value="cheese")),
+    ):
+        answer = answered(Ask(text=text, edits=[edit]), Trusted())
+        assert answer.faults
+        assert (answer.text, answer.also) == (edited(text, [edit]), "")
 
 
 def test_a_default_that_was_changed_has_a_nearest_value_too():

@@ -71,6 +71,17 @@ COMMANDS = {
     "estimate.frequency_hz = 200; nearest accepted: 'estimate.frequency_hz'",
     "build unit.toml --set temperature=20": "temperature = 20: unknown key; known: casting.room_c; "
     "nearest accepted: 'casting.room_c'",
+    "build unit.toml --set casting.temprature=20": "casting.temprature = 20: unknown key; known: casting.room_c; "
+    "nearest accepted: 'casting.room_c'",
+    "build unit.toml --set motor.thick=3": "motor.thick = 3: unknown key; known: motor.thickness_mm; "
+    "nearest accepted: 'motor.thickness_mm'",
+    "build unit.toml --set moulds.slot=2": "moulds.slot = 2: unknown key; known: moulds.slot_height_mm or "
+    "moulds.slot_width_clearance_mm",
+    "build unit.toml --set height=5": "height = 5: unknown key; a unit is as high as its layers make it: change "
+    "layers.0.wall_mm and the others, cap_mm or skin_mm",
+    "build unit.toml --set pot_life=3": "pot_life = 3: unknown key; it is the silicone's: `unitcad list materials "
+    "--pot-life 20..` lists those of 20 min and more",
+    "serve unit.toml --no-browser -o part.csv/x": "part.csv: is a file, not a folder; choose another with -o",
     "build wrist-band --set wall=2": "wall = 2: unknown key; known: unit.layers.0.wall_mm or unit.layers.1.wall_mm",
     "build unit.toml --set estimate.stack=1": "estimate.stack = 1: unknown key; it went: the range is that of the "
     "rule; leave it out",

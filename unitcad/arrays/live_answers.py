@@ -38,6 +38,8 @@ from unitcad.validation.plain_data import at
 from unitcad.validation.suggestions import every_fault
 
 as_toml = to_toml
+PICKED = ("array", "layout.kind", "unit")
+"""Fields whose change needs others."""
 
 
 def judge(data: dict[str, Any]) -> Mapping[str, Any]:
@@ -77,6 +79,13 @@ def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]
     for one in every:
         one.line = line_of(text, one.field)
     return every
+
+
+def sound_with(data: Mapping[str, Any], before: Array) -> dict[str, Any]:
+    """Return the data of a shipped array of a picked kind; listed points begin as the places of the array before."""
+    sound = sound_array(data)
+    points = [[round(place.x, 3), round(place.y, 3)] for place in before.places]
+    return sound if at(data, "layout.kind") != "list" else {**sound, "layout": {"kind": "list", "points_mm": points}}
 
 
 def named_files(data: Mapping[str, Any]) -> dict[str, str]:

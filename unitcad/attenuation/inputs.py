@@ -48,8 +48,8 @@ class Quantity(msgspec.Struct, frozen=True):
 class SiliconeLayer(msgspec.Struct, frozen=True):
     """A layer of the unit: wall thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio, tan delta.
 
-    `place`, `doubt`: of its silicone (`edge.contrast.place_of`). `first` is its number in the spec, from 0, if that is
-    not its place among the unit's layers.
+    `place`, `doubt`: of its silicone (`edge.contrast.place_of`); `other`: it is none of the catalogue's. `first` is its
+    number in the spec, from 0, if that is not its place among the unit's layers.
     """
 
     material: str
@@ -60,6 +60,7 @@ class SiliconeLayer(msgspec.Struct, frozen=True):
     tan_delta: Quantity
     place: float
     doubt: float = 0.0
+    other: bool = False
     first: int | None = None
 
 

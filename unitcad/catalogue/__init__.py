@@ -274,7 +274,8 @@ def _unknown_motor(field: str, name: str, known: Mapping[str, Motor]) -> Refusal
 
     order = sorted(known, key=off)
     listed = some((f"{each} ({sizes[each][0]:g} x {sizes[each][1]:g} mm)" for each in order), _MOST_MOTORS)
-    limit = f"unknown name; known: {listed}; for another motor leave part out and give diameter_mm and thickness_mm"
+    limit = f"unknown name; known: {listed} (`unitcad list motors` lists all); for another motor leave part out"
+    limit += " and give diameter_mm and thickness_mm"
     return Refusal(field, name, limit, order[0] if typed or meant else None)
 
 

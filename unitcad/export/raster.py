@@ -12,6 +12,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageChops, ImageDraw, ImageFont
@@ -32,7 +33,7 @@ MOST_CHARACTERS = 28
 """The longest name that is written whole."""
 MARGIN_PX, EDGE_PX, GAP_PX, APART_PX = 6, 8, 6, 12
 """White margin above and below the drawing; gap from a name to the picture's edge, to the drawing, to another name."""
-_FRAGMENTS = 200_000  # a block's, which stay in the processor's cache
+_FRAGMENTS = 50_000  # a block's, which stay in the processor's cache
 _FACES = 100_000
 
 
@@ -232,7 +233,7 @@ def _fragments(
     height, width = shape
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
-        one, heights = corners[:, 0], corners[:, :, 1]
+        one, heights, sides = corners[:, 0], corners[:, :, 1], _sides(corners)
         normal = np.cross(corners[:, 1] - one, corners[:, 2] - one)
         area = normal[:, 2]
         across, down = -normal[:, :2].T / np.where(area, area, 1.0)
@@ -242,10 +243,11 @@ def _fragments(
         rows = (high - low + 1)[which]
         for some in _blocks(rows):
             face, row = np.repeat(which[some], rows[some]), _count_from(low[which[some]], rows[some])
-            left, right = _span(corners, face, row + 0.5)
-            left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
-            right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
-            number = np.maximum(right - left + 1, 0)
+            left, right = _span(sides, face, row + 0.5)
+            left, right = np.maximum(np.ceil(left - 0.5), 0), np.minimum(np.floor(right - 0.5), width - 1)
+            met = np.flatnonzero(right >= left)  # a sliver has most rows between the middles of pixels
+            face, row, left, right = face[met], row[met], left[met].astype(int), right[met].astype(int)
+            number = right - left + 1
             lean = across[face]
             level = one[face, 2] + down[face] * (row + 0.5 - one[face, 1]) + lean * (left + 0.5 - one[face, 0])
             for block in _blocks(number):
@@ -268,14 +270,50 @@ def _count_from(start: np.ndarray, count: np.ndarray) -> np.ndarray:
     return np.arange(count.sum()) + np.repeat(start - (np.cumsum(count) - count), count)
 
 
-def _span(corners: np.ndarray, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return start and end (px) of the line y = `level` in faces of `corners` (n, 3, 3): (m,) each."""
-    x0, y0 = corners[face, :, 0], corners[face, :, 1]
+class _Sides(NamedTuple):
+    """The sides of faces (n): of each x, y, run, rise, least and largest x (3n, 6); the lowest and the middle y (n,).
+
+    `long` goes from the lowest to the highest corner, past the middle one; `below` and `above` meet there.
+    """
+
+    table: np.ndarray
+    least: np.ndarray
+    middle: np.ndarray
+    highest: np.ndarray
+    long: np.ndarray
+    below: np.ndarray
+    above: np.ndarray
+
+    def cross(self, side: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """Return the x (m,) at which sides, or the lines that they are on, meet y = `level` (m,)."""
+        x, y, run, rise, low, high = self.table[side].T
+        return np.clip(x + (level - y) / rise * run, low, high)
+
+
+def _sides(corners: np.ndarray) -> _Sides:
+    """Return the sides of faces with `corners` (n, 3, 3) in px."""
+    x0, y0 = corners[:, :, 0], corners[:, :, 1]
     x1, y1 = np.roll(x0, 1, axis=1), np.roll(y0, 1, axis=1)
-    crosses = (np.minimum(y0, y1) <= level[:, None]) & (level[:, None] <= np.maximum(y0, y1)) & (y0 != y1)
-    share = (level[:, None] - y0) / np.where(y0 != y1, y1 - y0, 1.0)
-    x = np.clip(x0 + share * (x1 - x0), np.minimum(x0, x1), np.maximum(x0, x1))
-    return np.where(crosses, x, np.inf).min(axis=1), np.where(crosses, x, -np.inf).max(axis=1)
+    rise = np.where(y0 != y1, y1 - y0, 1.0)
+    table = np.stack([x0, y0, x1 - x0, rise, np.minimum(x0, x1), np.maximum(x0, x1)], axis=2).reshape(-1, 6)
+    order = np.argsort(y0, axis=1, kind="stable")
+    opposite = (order - 1) % 3 + 3 * np.arange(len(corners))[:, None]  # the number of the side opposite a corner
+    above, long, below = np.ascontiguousarray(opposite.T)
+    least, middle, highest = np.ascontiguousarray(np.take_along_axis(y0, order, axis=1).T)
+    return _Sides(table, least, middle, highest, long, below, above)
+
+
+def _span(sides: _Sides, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return start and end (px) of the line y = `level` in faces, all of which meet it: (m,) each."""
+    middle = sides.middle[face]
+    first = (level < middle) | ((level == middle) & (sides.least < sides.middle)[face])
+    one = sides.cross(sides.long[face], level)
+    other = sides.cross(np.where(first, sides.below[face], sides.above[face]), level)
+    start, end = np.minimum(one, other), np.maximum(one, other)
+    if len(both := np.flatnonzero((level == middle) & first & (sides.middle < sides.highest)[face])):
+        third = sides.cross(sides.above[face[both]], level[both])
+        start[both], end[both] = np.minimum(start[both], third), np.maximum(end[both], third)
+    return start, end
 
 
 def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

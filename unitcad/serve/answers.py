@@ -21,8 +21,8 @@ from unitcad.json_text import parse_message
 from unitcad.serve import unit_answers
 from unitcad.serve.cupboard_choices import offered, with_entries
 from unitcad.serve.form import edited
-from unitcad.serve.messages import ALL, Answer, Ask, Fault, Held, Trusted
-from unitcad.serve.remedies import add_remedies
+from unitcad.serve.messages import ALL, Answer, Ask, Edit, Fault, Held, Trusted
+from unitcad.serve.remedies import add_remedies, changes_of_pick, in_words
 from unitcad.validation import compound_kind
 
 
@@ -67,6 +67,8 @@ def _answered(ask: Ask, trusted: Trusted, held: Held) -> Answer:
         kind.ANSWERS[ask.what](subject, answer)
     except Refusal as error:
         answer.faults = [_fault(error)]
+        if whole is not None and subject is None and (along := _with_pick(ask, kind, whole, trusted, held)):
+            return along
         if whole is not None and subject is None:
             every = [_fault(one) for one in kind.faults_of(error, whole, text)]
             answer.faults = add_remedies(every, whole, ask.since, kind.judge, kind.makeable)
@@ -78,6 +80,24 @@ def _answered(ask: Ask, trusted: Trusted, held: Held) -> Answer:
         answer.groups = offered(kind.form(data, subject), held, unit=kind is unit_answers)
         answer.spec = kind.as_data(subject) if subject else None
     return answer
+
+
+def _with_pick(ask: Ask, kind: Any, whole: dict[str, Any], trusted: Trusted, held: Held) -> Answer | None:
+    """Return the answer to an ask whose picked design needs other changes, with them; None if none are found."""
+    picked = next((edit for edit in reversed(ask.edits) if edit.path in kind.PICKED and not edit.remove), None)
+    if picked is None:
+        return None
+    try:
+        before = parse_toml(edited(ask.text, [edit for edit in ask.edits if edit != picked]), "the text")
+        sound = kind.sound_with(whole, answers_about(before).settled(before, trusted))
+    except UnitcadError:  # refused before
+        return None
+    changes = changes_of_pick(picked.path, whole, kind.judge, kind.makeable, sound)
+    edits = [Edit(path=path, value=value, remove=value is None) for path, value in changes.items()]
+    if not edits:
+        return None
+    answer = _answered(replace(ask, edits=[*ask.edits, *edits]), trusted, held)
+    return None if answer.faults else replace(answer, also=in_words(changes), picked=picked.path)
 
 
 def answers_about(data: Mapping[str, Any]) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -63,7 +64,7 @@ class Live:
 
     `text` is the first text, `name` its file's, `trusted` the files that texts may name, `starts` the texts to start
     from. `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that the
-    page lists. `held`: the entries that the pickers offer.
+    page lists. `held`: the entries that the pickers offer. `known`: the SHA-256 of the file that was opened.
     """
 
     text: str
@@ -76,6 +77,7 @@ class Live:
     port: int
     batch: Path | None = None
     held: Held = ALL
+    known: str = ""
 
     def __post_init__(self) -> None:
         self.cookie = f"unitcad-{self.port}"
@@ -106,7 +108,7 @@ class Live:
                 batch = (await asyncio.to_thread(page_data, self.batch, modelled=None))[0]
             except (UnitcadError, OSError, RuntimeError) as error:  # RuntimeError: a loop of links
                 return PlainTextResponse(f"{error}\n", 422)
-        html = live_page(self.text, self.name, str(self.folder), self.starts, batch)
+        html = live_page(self.text, self.name, str(self.folder), self.starts, batch, self.known)
         headers = {"content-security-policy": HEADER_POLICY}
         response = Response(html, media_type="text/html; charset=utf-8", headers=headers)
         response.set_cookie(self.cookie, self.keys.cookie, httponly=True, samesite="strict")
@@ -117,15 +119,16 @@ class Live:
         path = self.folder / save.name
         if names_device(save.name):
             raise Refusal("name", save.name, "is the name of a device on Windows", f"my-{save.name}")
+        content = save.text.encode("utf-8")
         async with self._saving:
-            await asyncio.to_thread(_write, path, save.text.encode("utf-8"), save.replace)
+            await asyncio.to_thread(_write, path, content, save)
         # Work in progress is saved too, and the page says that it is refused.
         refused = None
         try:
             await self._resolved(save.text)
         except UnitcadError as error:
             refused = str(error)
-        return msgspec.json.encode({"path": str(path), "refused": refused})
+        return msgspec.json.encode({"path": str(path), "refused": refused, "known": _digest(content)})
 
     async def build(self, build: Build) -> bytes:
         """Start the full build of the text."""
@@ -241,15 +244,20 @@ def values_of(sweep: Sweep) -> list[float] | list[str]:
     return [int(value) for value in values] if all(value.is_integer() for value in values) else values
 
 
-def _write(path: Path, content: bytes, replace: bool) -> None:
-    """Write a spec; without `replace`, only if nothing else than the same is there. Raises Refusal, OSError."""
-    if os.path.lexists(path) and not replace:
-        same = False
-        with contextlib.suppress(UnitcadError):  # a link, no regular file, or larger
-            same = read(path, largest=len(content), links=False) == content
-        if not same:
-            raise Refusal("name", path.name, "exists already; replace it, or choose another name")
+def _write(path: Path, content: bytes, save: Save) -> None:
+    """Write a spec; without `replace`, only over the same or the known file. Raises Refusal, OSError."""
+    if os.path.lexists(path) and not save.replace:
+        found = ""
+        with contextlib.suppress(UnitcadError):  # a link, no regular file, or larger than a spec
+            found = _digest(read(path, links=False))
+        if found not in (save.known, _digest(content)) or not found:
+            why = "was changed on disk since this page opened or saved it" if save.known else "exists already"
+            raise Refusal("name", path.name, f"{why}; replace it, or choose another name")
     write(path, content)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def _pieces(file: IO[bytes]) -> Iterator[bytes]:

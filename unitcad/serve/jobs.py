@@ -135,14 +135,14 @@ class Jobs:
 @contextmanager
 def build_folder(out: Path) -> Iterator[Path]:
     """Make a folder for a build's files, which goes with the block; of a killed server the next start removes it."""
-    with _temporary_folder(out), scratch(out) as folder:
+    with temporary_folder(out), scratch(out) as folder:
         yield folder
 
 
 @contextmanager
 def sweep_folder(out: Path) -> Iterator[Path]:
     """Make the first of sweep-1, sweep-2, ... that is not there; it goes with the block unless `results` are in it."""
-    with _temporary_folder(out):
+    with temporary_folder(out):
         number = count(1)
         while True:
             folder = out / f"sweep-{next(number)}"
@@ -157,7 +157,7 @@ def sweep_folder(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _temporary_folder(out: Path) -> Iterator[None]:
+def temporary_folder(out: Path) -> Iterator[None]:
     """Make a folder, and remove it with the block if it was not there and has nothing in it."""
     before = out.is_dir()
     out.mkdir(parents=True, exist_ok=True)

@@ -28,17 +28,19 @@ def live_page(
     folder: str,
     starts: Mapping[str, str | None],
     batch: dict[str, Any] | None = None,
+    known: str = "",
 ) -> str:
     """Return the HTML of the page that starts with a spec's `text`, the file `name` of `folder`.
 
     It has no token: the opened address has it, and the page takes it from there.
     `starts` are the texts to start from by their names, None for one that may not be used. `batch`: the data of a
-    batch's page, whose rows then open live.
+    batch's page, whose rows then open live. `known`: the SHA-256 of the file, if a save may replace it.
     """
     data: dict[str, Any] = {
         "text": text,
         "name": name,
         "folder": folder,
+        "known": known,
         "version": __version__,
         "batch": batch,
         "templates": starts,

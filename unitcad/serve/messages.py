@@ -55,11 +55,15 @@ class Ask(Message, frozen=True, kw_only=True):
 
 
 class Save(Message, frozen=True, kw_only=True):
-    """A request to write the text as a file in the folder; `replace`: a file that is there."""
+    """A request to write the text as a file in the folder; `replace`: a file that is there.
+
+    `known`: the SHA-256 of the file as the page opened or saved it; a file that is still the same is replaced too.
+    """
 
     text: Text
     name: FileName
     replace: bool = False
+    known: Annotated[str, Meta(pattern=r"^([0-9a-f]{64})?\Z")] = ""
 
 
 class Build(Message, frozen=True, kw_only=True):
@@ -154,11 +158,14 @@ class Answer(Struct, kw_only=True, omit_defaults=True):
     """An answer: the text after its edits, the faults, and the results if there is none.
 
     `processor_ms` is the time of the processor.
+    `also`: the changes that a picked design needed, in words; `picked`: its field.
     `groups` are the form's; `spec` the resolved spec; `figures` are (name, value, unit), `drawings` (caption, SVG).
     """
 
     text: str
     faults: list[Fault] = []
+    also: str = ""
+    picked: str = ""
     groups: list[Group] = []
     spec: dict[str, Any] | None = None
     model: dict[str, Any] | None = None

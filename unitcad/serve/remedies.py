@@ -9,10 +9,20 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.documents import parse_value
-from unitcad.errors import NEAREST, Refusal, UnitcadError, format_value
+from unitcad.errors import NEAREST, Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.serve.messages import Edit, Fault
+from unitcad.text import join_words
 from unitcad.validation.plain_data import ABSENT, at, drop
-from unitcad.validation.suggestions import Changes, find_refusal, follow, is_number, nearest_number, with_changes
+from unitcad.validation.suggestions import (
+    MOST,
+    Changes,
+    find_refusal,
+    follow,
+    is_number,
+    nearest_number,
+    with_changes,
+    write_changes,
+)
 
 Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 """Validates plain data and returns it settled; raises UnitcadError for a fault."""
@@ -39,6 +49,52 @@ def add_remedies(
     if len(fields) < 2 or not all([drop(without, field) for field in fields]) or find_refusal(without, {}, judge):
         return told
     return [replace(one, leave_out=True, together=[field for field in fields if field != one.field]) for one in told]
+
+
+def changes_of_pick(
+    picked: str, data: Mapping[str, Any], judge: Judge, whole: Judge, sound: Mapping[str, Any]
+) -> Changes:
+    """Return the other changes that a picked design needs; {} if none are found.
+
+    A value takes its nearest accepted one, a key that the design lacks goes, and a missing key comes from `sound`, a
+    file of that design. `whole` also refuses units without possible tools.
+    """
+    changes: dict[str, Any] = {}
+    for _ in range(MOST):
+        refusal = find_refusal(data, changes, judge) or find_refusal(data, changes, whole)
+        if refusal is None:
+            return changes
+        field, value = refusal.field, None if isinstance(refusal, UnknownKey) else refusal.nearest
+        if field == picked:
+            field, value = next((key for key in data if _is_in_the_way(key, picked, data, changes, judge)), ""), None
+        elif at(with_changes(data, changes), field) is ABSENT and (known := at(sound, field)) is not ABSENT:
+            value = known
+        if not field or isinstance(value, dict) or (field in changes and changes[field] == value):
+            return {}
+        changes = {path: each for path, each in changes.items() if not path.startswith(f"{field}.")} | {field: value}
+    return {}
+
+
+def _is_in_the_way(key: str, picked: str, data: Mapping[str, Any], changes: Changes, judge: Judge) -> bool:
+    """Tell whether a picked design is refused for a table that it lacks."""
+    if not isinstance(data[key], dict) or key in changes:
+        return False
+    after = find_refusal(data, {**changes, key: None}, judge)
+    return after is None or after.field.partition(".")[0] not in (picked, key)
+
+
+def in_words(changes: Changes) -> str:
+    """Write the changes that a design needed."""
+    gone = [path for path, value in changes.items() if value is None]
+    put = [
+        f"{path} ({len(value)} entries)"
+        if isinstance(value, list) and len(value) > 4
+        else write_changes({path: value}, "")
+        for path, value in changes.items()
+        if value is not None
+    ]
+    lists = (("Left out", gone), ("Set", put))
+    return " ".join(f"{word}: {join_words(each)}." for word, each in lists if each)
 
 
 def _with_remedy(

@@ -14,7 +14,7 @@ import uvicorn
 
 from unitcad.documents import parse_toml, read_toml
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.files import read_text
+from unitcad.files import read_text, scratch, sha256
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
@@ -22,7 +22,7 @@ from unitcad.rooms import expect_none_but
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, application
 from unitcad.serve.cupboard_choices import held_in
-from unitcad.serve.jobs import RESULTS
+from unitcad.serve.jobs import RESULTS, temporary_folder
 from unitcad.serve.messages import ALL, Source
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
@@ -56,11 +56,14 @@ def serve(
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
         out = batch.resolve().with_name(f"{batch.resolve().name}-live")
+    elif out != DEFAULT_OUT:
+        with temporary_folder(out), scratch(out):  # a folder that can't be written is refused before the page opens
+            pass
     for folder in (out, *out.glob(f"sweep-*/{RESULTS}")):
         with contextlib.suppress(OSError):  # it is not there, or not to be changed
             clear_leftovers(folder)
     path = named_file(source or default_template(), every_template(), "spec", WrongArgument)
-    text = read_text(path)
+    known, text = sha256(path), read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
     own = source is not None and is_path(source) and source not in custom_templates()
     folder = path.parent.resolve() if own else Path.cwd()
@@ -80,6 +83,7 @@ def serve(
         live = Live(
             text, path.name if own else f"{path.stem}.toml", folder, out,
             [source for source in trusted if source.named], starts, token, bound, batch, held,
+            known if own and not is_variant(folder) else "",
         )  # fmt: skip
         address = f"http://{LOOPBACK}:{bound}/?token={token}"
         config = uvicorn.Config(

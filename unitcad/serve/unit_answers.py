@@ -25,7 +25,7 @@ from unitcad.spec import Spec, to_data, to_toml
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
 from unitcad.validation import from_data, warnings
 from unitcad.validation.defaults import resolved
-from unitcad.validation.load import all_faults
+from unitcad.validation.load import all_faults, sound_data
 from unitcad.validation.load import judge as judge
 
 form = groups
@@ -33,6 +33,8 @@ named_files = files_named
 as_data = to_data
 as_toml = to_toml
 faults_of = all_faults
+PICKED = ("design",)
+"""Fields whose change needs others."""
 
 
 def settled(data: Mapping[str, Any], trusted: Trusted) -> Spec:
@@ -64,6 +66,11 @@ def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted)
 def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the unit's plain data, with the field of its design."""
     yield "design", data
+
+
+def sound_with(data: Mapping[str, Any], before: Spec) -> dict[str, Any]:
+    """Return the data of a template of a picked design."""
+    return sound_data(data)
 
 
 def has_code(spec: Spec) -> bool:
@@ -103,6 +110,8 @@ def _unit(spec: Spec, answer: Answer) -> None:
     across = widths(spec, [solids[body.name].bounding_box() for body in moulds.unit if body.made != "bought"])
     names = ("diameter",) if not is_custom(spec.design) else ("width",) if len(across) == 1 else ("length", "width")
     answer.figures = [(name, size, "mm") for name, size in zip((*names, "height"), (*across, height), strict=True)]
+    if not (spec.motor.absent or spec.motor.fill or is_custom(spec.design)):
+        answer.figures.append(("ring of air", moulds.dimensions.air_ring, "mm"))
     known, grams = catalogue.materials(spec.materials), []
     layers = {f"layer{i}": float(known[layer.material].density_g_cm3) for i, layer in enumerate(spec.layers, 1)}
     if layers.keys() <= solids.keys():

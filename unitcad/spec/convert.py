@@ -25,7 +25,7 @@ from unitcad.spec.fields import (
     plain_kinds,
     table_in,
 )
-from unitcad.spec.paths import EXACT, in_words, lone_path, meant
+from unitcad.spec.paths import EXACT, bare, in_words, lone_path, meant
 from unitcad.text import invisible, measured, printable, without_invisible
 
 T = TypeVar("T")
@@ -134,8 +134,10 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
             if key in fields:
                 yield from _refusals(below, fields[key].type, _below(field, key))
             else:
-                gone = getattr(table, "removed", {})
-                yield unknown_key(_below(field, key), below, fields, "`unitcad schema`", gone)
+                gone = getattr(table, "removed", {}).get(key, "")
+                instead = gone if not gone or gone in fields else f"it went: {gone}"
+                instead = instead or getattr(table, "elsewhere", {}).get(bare(key), "")
+                yield unknown_key(_below(field, key), below, fields, "`unitcad schema`", instead)
         missing = (name for name, entry in fields.items() if entry.required and name not in node)
         yield from (Refusal(_below(field, name), None, "is required") for name in missing)
         return

@@ -15,6 +15,8 @@ _ALIKE = 0.8
 """Least likeness of a step with a key, or of a table's name in the singular with the table."""
 _MOST_MEANT = 6
 """Paths that a refusal names."""
+_BEGINNING = 4
+"""Letters of a word's beginning that stand for the word: "thick" for "thickness_mm"."""
 EXACT = 3
 """Score of a key that differs from the typed one by its unit, or not at all."""
 
@@ -90,9 +92,19 @@ def _score(typed: str, key: str, kind: Any) -> int:
     if _same(bare(typed), bare(key)):
         return EXACT - 1
     words = {word for word in typed.split("_") if word}
-    if words and words <= set(bare(key).split("_")):
+    if words and _stand_for(words, bare(key).split("_")):
         return 2
-    return int(len(words) > 0 and words <= set(re.findall(r"[a-z]+", meaning(kind).lower())))
+    return int(len(words) > 0 and _stand_for(words, re.findall(r"[a-z]+", meaning(kind).lower()), _ALIKE))
+
+
+def _stand_for(typed: Iterable[str], words: list[str], alike: float = 1.0) -> bool:
+    """Tell whether each typed word is one of the words, the beginning of one, or as much alike."""
+
+    def stands(word: str, each: str) -> bool:
+        begins = len(word) >= _BEGINNING and each.startswith(word)
+        return word == each or begins or (alike < 1.0 and SequenceMatcher(None, word, each).ratio() > alike)
+
+    return all(any(stands(word, each) for each in words) for word in typed)
 
 
 def _within(tables: list[str], above: list[str]) -> bool:

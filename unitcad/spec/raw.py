@@ -46,10 +46,12 @@ Model = Literal["rule", "published", "corrected", "fem"]
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
     """A table of the spec: frozen, unknown keys refused.
 
-    `removed`: for each key of an earlier version the key that took its place, or what to do.
+    `removed`: for each key of an earlier version the key that took its place, or what to do. `elsewhere`: for words that
+    no table has as a key, where a person finds it.
     """
 
     removed: ClassVar[Mapping[str, str]] = {}
+    elsewhere: ClassVar[Mapping[str, str]] = {}
 
 
 class MotorTable(Table, frozen=True, kw_only=True):
@@ -320,6 +322,12 @@ class OutputTable(Table, frozen=True, kw_only=True):
 
 class RawSpec(Table, frozen=True, kw_only=True):
     """A haptic unit. Required: name, design, diameter_mm and [[layers]]."""
+
+    elsewhere: ClassVar = {
+        "height": "a unit is as high as its layers make it: change layers.0.wall_mm and the others, cap_mm or skin_mm",
+        "mass": "it follows from the parts: `unitcad estimate` and `build` say it",
+        "pot_life": "it is the silicone's: `unitcad list materials --pot-life 20..` lists those of 20 min and more",
+    }
 
     name: Annotated[
         str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")

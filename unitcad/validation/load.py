@@ -222,7 +222,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     try:
         return settled(whole)
     except Refusal as first:
-        every = every_fault(first, whole, lambda data: to_data(settled(data)), _sound(whole))
+        every = every_fault(first, whole, lambda data: to_data(settled(data)), sound_data(whole))
         raise _locate(every, data, source) from None
 
 
@@ -265,7 +265,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     except UnknownKey:
         raise
     except Refusal as refusal:
-        raise suggest(refusal, plain, judge, _sound(plain)) from None
+        raise suggest(refusal, plain, judge, sound_data(plain)) from None
 
 
 def judge(data: dict[str, Any]) -> dict[str, Any]:
@@ -273,7 +273,7 @@ def judge(data: dict[str, Any]) -> dict[str, Any]:
     return to_data(resolved(data))
 
 
-def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
+def sound_data(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settled data of the template of a spec's design, or of the default one.
 
     No other design replaces one in a file: it would refuse values that the file's accepts.
@@ -312,7 +312,7 @@ def _same(written: object, asked: object) -> bool:
 
 def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refusal]:
     """Return every fault of a text's plain data, `first` among them, each with its line; no file is read for it."""
-    every = every_fault(first, dict(data), judge, _sound(data))
+    every = every_fault(first, dict(data), judge, sound_data(data))
     for one in every:
         one.line = line_of(text, one.field)
     return every

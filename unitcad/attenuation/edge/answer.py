@@ -172,7 +172,9 @@ def _wider(lead: Lead, variant: EstimateInput) -> list[str]:
     whole = float(lead.predictive(units, of).scale[0])
     added = {name: float(one[0]) for name, one in lead.unmeasured(units, of).items()}
     felt = [name for name, more in added.items() if whole - np.sqrt(max(whole**2 - more, 0.0)) > _NOTICED * whole]
-    return sorted(felt, key=lambda name: -added[name])
+    of_nobody = "silicones (the key like names the one of the catalogue, if it is one)"
+    words = {"silicones": of_nobody} if any(layer.other for layer in variant.layers) else {}
+    return [words.get(name, name) for name in sorted(felt, key=lambda name: -added[name])]
 
 
 def _source(lead: Lead, variant: EstimateInput, fit: LabFit | None) -> Source:

@@ -209,12 +209,17 @@ class Crossings:
         pairs = join_pairs(self.crossing)
         if self.faces is None or not len(pairs):
             return pairs
-        a, b = self.faces.corners_of(*pairs.T)
-        reach = np.minimum(_reaches(a, b).min(axis=0), _reaches(b, a).min(axis=0))
+        corners = (self.faces.corners_of(*some.T) for some in _blocks(pairs))
+        reach = np.concatenate([np.minimum(_reaches(a, b), _reaches(b, a)).min(axis=0) for a, b in corners])
         one, other, holder = self.faces.corners_of(*self.leaned.T)
         sides = [_reaches(of, holder).max(axis=0) for of in (one, other)]
         reach[len(pairs) - len(self.leaned) :] = np.minimum(*sides)
         return pairs[reach > self.faces.rounding[pairs].max(axis=1)]
+
+
+def _blocks(pairs: Ints) -> list[Ints]:
+    """Return pairs in blocks, so that what is worked out of them stays small."""
+    return np.split(pairs, np.arange(_BLOCK, len(pairs), _BLOCK))
 
 
 def _reaches(a: Floats, b: Floats) -> Floats:
@@ -227,8 +232,8 @@ def _reaches(a: Floats, b: Floats) -> Floats:
 
 def crossing_boxes(faces: Faces, pairs: Ints) -> Floats:
     """Return the boxes (k, 2, 3) of the lines along which pairs of faces cross; those of one face are one line."""
-    a, b = faces.corners_of(*pairs.T)
-    ends = np.concatenate(_segment(a, b))
+    parts = [_segment(*faces.corners_of(*some.T)) for some in _blocks(pairs)]
+    ends = np.concatenate([end for side in zip(*parts, strict=True) for end in side])
     label = components(len(faces.original), *pairs.T)[np.tile(pairs[:, 0], 2)]
     _, label = np.unique(label, return_inverse=True)
     return np.stack(extents(ends, label, int(label.max()) + 1), axis=1)

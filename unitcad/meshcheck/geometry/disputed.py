@@ -13,7 +13,7 @@ from manifold3d import CrossSection
 
 from unitcad.geometry.arrays import Floats, Ints, cross, extent
 from unitcad.geometry.boxes import Interrupted, Tick
-from unitcad.meshcheck.geometry.layers import Layer, Slicer
+from unitcad.meshcheck.geometry.layers import Layer, Slicer, eroded
 from unitcad.meshcheck.geometry.mesh import float32_step
 from unitcad.meshcheck.geometry.resolution import EXACT, STEPS, Resolution
 from unitcad.meshcheck.geometry.topology import Topology, edges_of
@@ -64,11 +64,11 @@ def _search(slicer: Slicer, targets: Floats, limits: Resolution) -> Disputed:
         for layer in slicer.layers(axis, _heights(slicer, axis, targets, limits.layer)):
             slicer.tick()
             area = layer.disputed()
-            if area.is_empty() or area.offset(-rounding / 2).is_empty():
+            core = eroded(area, limits.thin / 2 * EXACT)
+            if core.is_empty() and eroded(area, rounding / 2).is_empty():
                 continue
             if area.area() > found.area and (axis == 2 or found.layer is None or found.layer.axis == axis):
                 found = replace(found, area=area.area(), layer=layer)
-            core = area.offset(-limits.thin / 2 * EXACT)
             if core.is_empty():
                 thin.append((layer, area))
             else:
@@ -129,7 +129,7 @@ def deepest(area: CrossSection) -> tuple[float, Floats]:
         return 0.0, np.zeros(2)
     least, most, core = 0.0, float(np.sqrt(area.area())), area  # no circle inside is as large
     while most - least > max(0.02 * most, _GRID):  # of a needle, no offset leaves anything
-        smaller = area.offset(-(least + most) / 2)
+        smaller = eroded(area, (least + most) / 2)
         if smaller.is_empty():
             most = (least + most) / 2
         else:

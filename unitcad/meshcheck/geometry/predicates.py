@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, cross
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _EPS = np.finfo(np.float64).eps / 2
 _BOUND = {2: (3.0 + 16.0 * _EPS) * _EPS, 3: (7.0 + 56.0 * _EPS) * _EPS}  # of the sum of the terms' sizes, by axes
@@ -238,38 +238,43 @@ def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
     return inside & (across > 0).any(axis=0) & (across < 0).any(axis=0)
 
 
-def common_point(a: Floats, b: Floats) -> Floats | None:
-    """Return a point of two triangles (3, 3) that meet: the middle of the point, segment or polygon that they share.
+def common_points(a: Floats, b: Floats) -> Floats:
+    """Return a point of pairs of triangles (n, 3, 3) that meet: the middle of the point, segment or polygon they share.
 
-    `a` is cut to the prism over `b` that is as high as rounding, so it is exact to rounding only; None if nothing is
-    left.
+    Each of `a` is cut to the prism over its `b` that is as high as rounding, so a point is exact to rounding only; not
+    a number if nothing is left.
     """
-    shift = b[0]
+    largest = np.maximum(np.abs(a).max(axis=(1, 2), initial=0.0), np.abs(b).max(axis=(1, 2), initial=0.0))
+    shift = b[:, :1]
     left, corners = a - shift, b - shift
-    size = max(np.abs(left).max(), np.abs(corners).max())
-    near = 1e-9 + 8 * float(np.spacing(max(np.abs(a).max(), np.abs(b).max()))) / size
-    left, corners = left / size, corners / size
-    normal = cross(corners[1:2] - corners[0], corners[2:] - corners[0])
-    inward = np.concatenate(
-        [normal, -normal, cross(np.repeat(normal, 3, axis=0), np.roll(corners, -1, axis=0) - corners)]
-    )
-    inward /= np.maximum(np.linalg.norm(inward, axis=1), 1e-150)[:, None]
-    for along, origin in zip(inward, corners[[0, 0, 0, 1, 2]], strict=True):
-        height = ((left - origin) * along).sum(axis=1) + near
-        cut = []
-        for k, point in enumerate(left):
-            if (height[k - 1] < 0) != (height[k] < 0):
-                cut.append(left[k - 1] + (point - left[k - 1]) * (height[k - 1] / (height[k - 1] - height[k])))
-            if height[k] >= 0:
-                cut.append(point)
-        if not cut:
-            return None
-        left = np.array(cut)
-    apart: list[Floats] = []
-    for point in left:
-        if all(np.abs(point - other).max() > 4 * near for other in apart):
-            apart.append(point)
-    return np.mean(apart, axis=0) * size + shift
+    size = np.maximum(np.abs(left).max(axis=(1, 2), initial=0.0), np.abs(corners).max(axis=(1, 2), initial=0.0))
+    near = (1e-9 + 8 * np.spacing(largest) / size)[:, None]
+    left, corners = left / size[:, None, None], corners / size[:, None, None]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None]
+    sides = np.cross(normal, np.roll(corners, -1, axis=1) - corners)
+    inward = np.concatenate([normal, -normal, sides], axis=1)
+    inward /= np.maximum(np.linalg.norm(inward, axis=2), 1e-150)[:, :, None]
+    empty = np.zeros(len(a), bool)
+    for i, k in enumerate((0, 0, 0, 1, 2)):
+        height = ((left - corners[:, k, None]) * inward[:, i, None]).sum(axis=2) + near
+        before, one = np.roll(height, 1, axis=1), np.roll(left, 1, axis=1)
+        crosses, kept = (before < 0) != (height < 0), height >= 0
+        share = before / np.where(crosses, before - height, 1.0)
+        cut = one + (left - one) * share[:, :, None]
+        # A convex polygon gains at most one corner; shorter ones repeat their last.
+        chosen = np.stack([crosses, kept], axis=2).reshape(len(a), 2 * left.shape[1])
+        points = np.stack([cut, left], axis=2).reshape(len(a), 2 * left.shape[1], 3)
+        count = chosen.sum(axis=1)
+        order = np.argsort(~chosen, axis=1, kind="stable")[:, : left.shape[1] + 1]
+        slots = np.minimum(np.arange(order.shape[1]), np.maximum(count - 1, 0)[:, None])
+        left = np.take_along_axis(points, np.take_along_axis(order, slots, axis=1)[:, :, None], axis=1)
+        empty |= count == 0
+    apart = np.ones(left.shape[:2], bool)
+    for k in range(1, left.shape[1]):
+        far = np.abs(left[:, :k] - left[:, k, None]).max(axis=2) > 4 * near
+        apart[:, k] = (far | ~apart[:, :k]).all(axis=1)
+    middle = np.where(apart[:, :, None], left, 0.0).sum(axis=1) / apart.sum(axis=1)[:, None]
+    return np.where(empty[:, None], np.nan, middle * size[:, None] + shift[:, 0])
 
 
 def without_area(corners: Floats) -> Bools:

@@ -12,7 +12,7 @@ from unitcad.geometry.arrays import Ints, among
 from unitcad.meshcheck.findings import Finding, Location, most_locations, point, tally
 from unitcad.meshcheck.geometry.crossings import Faces, join_pairs
 from unitcad.meshcheck.geometry.mesh import float32_step
-from unitcad.meshcheck.geometry.predicates import common_point
+from unitcad.meshcheck.geometry.predicates import common_points
 from unitcad.meshcheck.rules.inspection import Inspection, at_edges
 from unitcad.meshcheck.rules.registry import Rule
 from unitcad.meshcheck.rules.severity import by_layers, by_width
@@ -134,9 +134,10 @@ def _places(faces: Faces, pairs: Ints) -> list[Location]:
     chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
     corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)]
     names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
-    for (a, b), (one, other) in zip(corners, names, strict=True):
-        common = common_point(a, b)
-        xyz = point((a.mean(axis=0) if common is None else common) + 0.0)  # no -0
+    common = common_points(corners[:, 0], corners[:, 1])
+    middles = np.where(np.isnan(common), corners[:, 0].mean(axis=1), common) + 0.0  # no -0
+    for middle, (one, other) in zip(middles, names, strict=True):
+        xyz = point(middle)
         near = tuple(round(v / grid) for v in xyz)
         if near in by_place:
             continue

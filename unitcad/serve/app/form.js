@@ -248,7 +248,9 @@
       if (made) made.refuse({ message: `The field ${why}; the spec keeps the value before.` });
     }
 
-    return { node, show, refuse, unread, told };
+    const row = (path) => controls.has(path) && controls.get(path).row;
+
+    return { node, show, refuse, unread, told, row };
   }
 
   Object.assign(window.unitcad, { createForm });

@@ -15,8 +15,11 @@
   };
 
   // options: server, text(), name, folder, numbers() gives [{path, kind, value, low, high}] of the form's numbers.
-  // silicones() gives [{path, usual}] of the fields of silicones.
-  function createJobs({ server, text, name, folder, numbers, silicones }) {
+  // silicones() gives [{path, usual}] of the fields of silicones. `before` has the known content, as SHA-256, by file name:
+  // a file that is still so is replaced without a question. keep() is told of a save.
+  function createJobs({ server, text, name, folder, numbers, silicones, keep, before }) {
+    const known = { ...before };
+    let wrote = false;
     const progress = el("div", { className: "job", role: "status", tabindex: "-1" });
     // Beside what is written anew, so that it keeps the focus.
     const cancel = el("button", { type: "button", hidden: true, onclick: () => server.send("/cancel", { job: running }) }, "Cancel");
@@ -39,18 +42,38 @@
         clear(said, "A file's name has letters, digits, dots, dashes and blanks, begins with a letter or a digit and ends in .toml.");
         return;
       }
-      const answer = await server.send("/save", { text: text(), name: file.value, replace });
-      if (answer.path) clear(said, `Saved as ${answer.path}.`, answer.refused && el("span", { className: "refusal" }, ` It is refused, so nothing can be built from it yet: ${answer.refused}`));
-      else {
+      const answer = await server.send("/save", { text: text(), name: file.value, replace, known: known[file.value] || "" });
+      if (answer.path) {
+        known[file.value] = answer.known;
+        wrote = true;
+        keep();
+        clear(said, `Saved as ${answer.path}.`, answer.refused && el("span", { className: "refusal" }, ` It is refused, so nothing can be built from it yet: ${answer.refused}`));
+      } else {
         const there = answer.faults[0].field === "name" && !replace;
         clear(said, answer.faults[0].message, " ", there && el("button", { type: "button", onclick: () => { file.focus(); save(true); } }, "Replace it"));
       }
     }
 
+    // In the page's head, in sight from everywhere: how far the job is, then its result.
+    const link = el("a", { href: "#do", onclick: (event) => { if (link.target) return; event.preventDefault(); toProgress("center"); } });
+    const chip = el("span", { className: "chip", id: "job", role: "status", hidden: true }, link);
+    const toProgress = (block) => progress.scrollIntoView({ block });
+
+    function inHead(kind, words, page) {
+      Object.assign(chip, { hidden: false, className: `chip ${kind}` });
+      Object.assign(link, { href: page || "#do", target: page ? "_blank" : "", rel: "noopener" });
+      if (link.textContent !== words) link.textContent = words;
+    }
+
+    function failed(words) {
+      clear(progress, el("p", { className: "fault" }, words));
+      toProgress("nearest");
+    }
+
     async function follow(state) {
       if (!state.job) {
         if (cancel.hidden) clear(log);
-        clear(progress, el("p", { className: "fault" }, state.faults[0].message));
+        failed(state.faults[0].message);
         return;
       }
       running = state.job;
@@ -65,7 +88,8 @@
         const next = await server.send(`/job/${state.job}`);
         if (!next.job) {
           stopped();
-          clear(progress, el("p", { className: "fault" }, next.faults[0].message));
+          failed(next.faults[0].message);
+          inHead("bad", "no answer");
           break;
         }
         now = next;
@@ -77,13 +101,18 @@
       // A count of variants is a length of the bar.
       const [, count, of] = /^(\d+) of (\d+) /.exec(state.stage) || [];
       const words = !state.ended ? `${state.title} is under way: ${state.stage ? inWords(state.stage) : "starting"}` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
+      const page = done && state.page && `/files/${state.page.split("/").map(encodeURIComponent).join("/")}`;
       progress.dataset.ended = String(Boolean(state.ended));
       clear(progress, el("p", { className: "lead" }, words[0].toUpperCase() + words.slice(1)),
         !state.ended && el("progress", { "aria-label": state.title, ...(of ? { max: Number(of), value: Number(count) } : {}) }),
-        done && state.folder && el("p", {}, "In ", el("code", {}, state.folder), ". ", state.page && el("a", { href: `/files/${state.page.split("/").map(encodeURIComponent).join("/")}`, target: "_blank", rel: "noopener" }, "Open its page")));
+        done && state.folder && el("p", {}, "In ", el("code", {}, state.folder), ". ", page && el("a", { href: page, target: "_blank", rel: "noopener" }, "Open its page")));
       clear(log, state.lines.length > 0 && el("pre", { className: "scroll" }, state.lines.join("\n")));
-      if (state.ended) stopped();
-      else cancel.hidden = false;
+      inHead(!state.ended ? "" : done ? "good" : "bad", !state.ended ? (of ? `${count} of ${of}` : "building") : done ? "open the result" : state.code === 130 || state.code < 0 ? "cancelled" : "failed", page);
+      if (state.ended) {
+        // Who changes the spec meanwhile stays there.
+        if (!document.activeElement || !document.activeElement.closest("#spec")) toProgress("nearest");
+        stopped();
+      } else cancel.hidden = false;
     }
 
     function stopped() {
@@ -128,10 +157,9 @@
       }
     }
 
-    // In the page's head, in sight from everywhere; what it tells stands in this section.
     const build = async () => {
       clear(said);
-      node.scrollIntoView({ block: "nearest" });
+      toProgress("center");
       follow(await server.send("/build", { text: text() }));
     };
     const sweep = async () => {
@@ -160,7 +188,7 @@
       el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count), field("silicones", words),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
       progress, cancel, log);
-    return { node, keys, suggest, button: el("button", { type: "button", className: "main", onclick: build }, "Build this") };
+    return { node, keys, suggest, chip, known: () => known, saved: () => wrote, button: el("button", { type: "button", className: "main", onclick: build }, "Build this") };
   }
 
   Object.assign(window.unitcad, { createJobs });

@@ -6,6 +6,7 @@
   const page = document.getElementById("page");
   const APART_MS = 900;
   const AFTER_MS = 120;
+  const MOST_TOLD = 8;
   const UNWRITTEN = "A change is shown at once. Nothing is written until you save, build or sweep.";
 
   function start() {
@@ -13,7 +14,7 @@
     const data = JSON.parse(new TextDecoder().decode(packed));
     const server = U.createServer();
     const kept = U.keepText(data.text);
-    const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], made: new Map(), unmade: [], opened: "", later: 0, asked: 0 };
+    const state = { text: kept.text, pending: [], past: kept.past, future: [], file: kept.file || data.name, last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], made: new Map(), unmade: [], opened: "", later: 0, asked: 0 };
     window.unitcad.timings = [];
 
     const form = U.createForm({
@@ -43,6 +44,8 @@
     const title = el("h1", { tabindex: "-1" }, data.name);
     const opened = el("p", { className: "line" }, UNWRITTEN);
     const chip = el("span", { className: "chip", role: "status", id: "state" }, "starting");
+    const also = el("p", { className: "note", id: "also", role: "status" });
+    let pointerDown = false;
     const host = el("div", { className: "stage-host" });
     const figures = el("div", { className: "chips", id: "figures" });
     const glance = el("p", { id: "glance" });
@@ -50,17 +53,18 @@
     const drawn = el("div", { id: "drawn" });
     const judged = el("div", { id: "judged" });
     const estimated = el("div", { id: "estimated" });
+    const head = el("div", { className: "buttons" }, template, undo, redo);
     const batch = data.batch && createBatch(data.batch);
     const view = section("view", "3D", figures, glance, others, host);
     const pinned = U.createPinned({ current, restore: replaceText, before: kept.pinned, keep });
-    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers, silicones });
+    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers, silicones, keep, before: kept.known || { [data.name]: data.known } });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
     clear(page,
-      el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, jobs.button, theme.button())),
+      el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, jobs.chip, jobs.button, theme.button())),
       kept.back && el("p", { className: "note", id: "kept" }, "Your changes from before the page was loaded again are back. ", el("button", { type: "button", onclick: () => startFrom(data.text) }, `Start from ${data.name} again`)),
       batch && batch.node,
       el("div", { className: "columns" },
-        el("section", { id: "spec", "aria-label": "Spec", tabindex: "-1" }, el("div", { className: "buttons" }, template, undo, redo), form.node, tabs),
+        el("section", { id: "spec", "aria-label": "Spec", tabindex: "-1" }, head, form.node, tabs),
         el("div", { className: "shown" }, view, section("section", "Section", drawn), jobs.node, pinned.node, section("judgement", "Moulds", judged), estimated)),
       el("footer", {}, el("p", {}, `unitcad ${data.version}. This page contacts only its own server.`)));
 
@@ -69,7 +73,7 @@
 
     // A text that was not changed is the server's to give.
     function keep() {
-      if (state.past.length || pinned.held()) kept.keep({ text: state.text, past: state.past, pinned: pinned.held() });
+      if (state.past.length || pinned.held() || jobs.saved()) kept.keep({ text: state.text, past: state.past, pinned: pinned.held(), file: state.file, known: jobs.known() });
     }
 
     // The text as the page knows it; edits that are under way are in the next one.
@@ -106,11 +110,14 @@
       return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, level, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
 
+    // The spec as it is to a person: the last text, the changes of it that are not answered yet, and the file's name.
+    function moment() { return { text: state.text, pending: [...state.pending], file: state.file }; }
+
     function remember(path, coalesce) {
       const at = performance.now();
       const same = coalesce && path === state.last.path && at - state.last.at < APART_MS;
       if (!same) {
-        state.past.push(state.text);
+        state.past.push(moment());
         if (state.past.length > 200) state.past.shift();
       }
       state.future = [];
@@ -141,8 +148,7 @@
 
     function startFrom(text, file = data.name) {
       state.opened = "";
-      jobs.suggest(file);
-      replaceText(text);
+      replaceText(text, file);
     }
 
     function typed() {
@@ -152,19 +158,28 @@
       ask();
     }
 
-    function replaceText(next) {
+    function replaceText(next, file = state.file) {
       remember("", false);
+      state.from = state.unit.spec;
       state.text = next;
       state.pending = [];
+      named(file);
       ask();
+    }
+
+    // Another spec has another file.
+    function named(file) {
+      if (file !== state.file) jobs.suggest(file);
+      state.file = file;
     }
 
     function step(from, to) {
       if (!from.length) return;
-      to.push(state.text);
-      state.text = from.pop();
-      state.pending = [];
-      state.last = { path: "", at: 0 };
+      to.push(moment());
+      const { file, ...rest } = from.pop();
+      Object.assign(state, rest, { last: { path: "", at: 0 }, from: null });
+      named(file);
+      text.value = state.text;
       ask();
     }
 
@@ -173,6 +188,7 @@
       const mine = (state.asked += 1);
       buttons();
       clearTimeout(state.later);
+      clear(also);
       chip.textContent = "working";
       page.setAttribute("aria-busy", "true");
       const sent = state.pending.length;
@@ -217,15 +233,29 @@
       buttons();
       if (!faults.length) await shown(answer);
       pinned.show();
+      toldAlso(answer);
       window.unitcad.timings.push({ what: "unit", ms: performance.now() - begun, processor: answer.processor_ms, faults: faults.length });
       document.documentElement.dataset.ready = "yes";
       if (faults.length) {
         said("bad", unread.length ? "the text can't be read" : faults.length === 1 ? "1 value is refused" : `${faults.length} values are refused`);
+        reveal();
         page.setAttribute("aria-busy", "false");
         return;
       }
       // While a number is being dragged the moulds wait; the estimate and the moulds then come side by side.
       state.later = setTimeout(() => rest(mine, begun), AFTER_MS);
+    }
+
+    // The changes that came with a change: those that a picked design needed, or the values of another spec.
+    function toldAlso(answer) {
+      const { from } = state;
+      state.from = null;
+      const unlike = from && answer.spec ? U.differences([from, answer.spec].map((one) => U.flat(one))).map(([path]) => path) : [];
+      const most = unlike.slice(0, MOST_TOLD).join(", ") + (unlike.length > MOST_TOLD ? ` and ${unlike.length - MOST_TOLD} more` : "");
+      clear(also, answer.also || (unlike.length ? `Other values than before: ${most}.` : ""), (answer.also || unlike.length > 0) && " Undo brings the spec before back.");
+      const host = answer.also && form.row(answer.picked);
+      (host || head).append(also);
+      if (answer.also) reveal();
     }
 
     async function shown(answer) {
@@ -317,6 +347,7 @@
         said("bad", "no moulds");
         const left = form.refuse(faults);
         clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view shows only the ${noun()}.`));
+        reveal();
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
       } else said(failed.length ? "bad" : "good", `checks: ${manifest.mould_checks.length - failed.length} of ${manifest.mould_checks.length}`);
@@ -324,10 +355,43 @@
 
     function toForm() { page.querySelector("#spec").focus({ preventScroll: true }); }
 
+    // What it says is a link to its reasons: the refusals, or the list of the checks.
     function said(kind, words) {
       chip.className = `chip ${kind}`;
-      chip.textContent = words;
+      clear(chip, el("a", { href: "#judgement", onclick: (event) => { event.preventDefault(); show(); } }, words));
     }
+
+    const inSight = (node) => {
+      const { top, bottom } = node.getBoundingClientRect();
+      const { top: from, bottom: to } = [node.closest("#spec")].filter(Boolean).map((one) => one.getBoundingClientRect())[0] || { top: 0, bottom: innerHeight };
+      return top >= Math.max(from, page.querySelector(".top").getBoundingClientRect().bottom) - 1 && bottom <= Math.min(to, innerHeight) + 1;
+    };
+
+    // Every refusal that is on the page, in its order, as far as it can be seen with its group open.
+    const refusals = () => [...page.querySelectorAll(".refusal, #also")].filter((one) => one.textContent && one.checkVisibility());
+
+    function show() {
+      const [first] = refusals().filter((one) => one !== also);
+      const node = first || page.querySelector("#judgement");
+      node.scrollIntoView({ block: first ? "center" : "start" });
+      const control = first && first.closest(".field") && first.closest(".field").querySelector("input, select, .several") || first && first.querySelector("button");
+      if (control) control.focus({ preventScroll: true });
+    }
+
+    // The reason comes to the person: of a field that is being typed in or dragged only that field's own, and not before
+    // the pointer is up, so that nothing moves away from under it.
+    function reveal() {
+      const at = document.activeElement;
+      const field = at && at.closest && at.closest(".field");
+      const typing = at === text || at && at.matches("input:not([type='checkbox'])");
+      const all = refusals();
+      const own = field && all.find((one) => field.contains(one));
+      const node = own || (typing ? null : all[0]);
+      if (pointerDown || !node || all.some((one) => (!typing || one === own) && inSight(one))) return;
+      node.scrollIntoView({ block: "nearest" });
+    }
+    document.addEventListener("pointerdown", () => { pointerDown = true; });
+    for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => { pointerDown = false; if (page.dataset.stale === "true" || page.dataset.moulds === "none") reveal(); });
 
     function buttons() {
       undo.disabled = !state.past.length;
@@ -335,7 +399,8 @@
     }
 
     document.addEventListener("keydown", (event) => {
-      if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target === text) return;
+      // A name that is typed elsewhere than in the spec has its browser's own undo.
+      if (!(event.ctrlKey || event.metaKey) || event.altKey || (event.target.matches("input:not([type='checkbox'])") && !event.target.closest("#spec"))) return;
       const key = event.key.toLowerCase();
       if (key === "z" && !event.shiftKey) step(state.past, state.future);
       else if (key === "y" || (key === "z" && event.shiftKey)) step(state.future, state.past);
@@ -352,6 +417,7 @@
     // What the row starts from is accepted, so its values are refused where they stand, with what would do.
     async function openRefused(text, changes) {
       remember("", false);
+      state.from = null;
       state.text = text;
       state.pending = [];
       await ask();
@@ -387,6 +453,7 @@
     }
 
     text.value = state.text;
+    if (state.file !== data.name) jobs.suggest(state.file);
     if (batch) {
       batch.plot();
       window.addEventListener("hashchange", openVariant);
