@@ -20,7 +20,6 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 
 from unitcad.geometry.arrays import Bools, Floats, Ints
-from unitcad.kernels.mesh import arrays, corners_and_faces, shells
 from unitcad.meshcheck.geometry.distance import squares
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import GRID_PER_MM
@@ -72,10 +71,11 @@ def inset(body: Polyhedron, by: float, side: float) -> Polyhedron | None:
     # Outside the body too there are nodes far from its surface.
     deep = np.where(corners[:, 2:] <= _SEAT, [0, 0, low[2]], 0.0)
     reach = Manifold(Mesh64(corners + deep, faces.astype(np.uint64)))
-    pieces = [piece for piece in shells(found) if (piece ^ reach).volume() > piece.volume() / 2 > 0]
+    pieces = [piece for piece in found.decompose() if (piece ^ reach).volume() > piece.volume() / 2 > 0]
     if not pieces:
         return None
-    return on_grid("", "layer", *arrays(max(pieces, key=lambda piece: piece.volume()).simplify(_FLAT)))
+    mesh = max(pieces, key=lambda piece: piece.volume()).simplify(_FLAT).to_mesh64()
+    return on_grid("", "layer", np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, np.int64))
 
 
 def _level(values: Floats, low: Floats, side: float) -> tuple[Floats, Ints]:
@@ -233,5 +233,5 @@ def _fine(pieces: Floats, side: float) -> Floats:
 
 def arrays_of(body: Polyhedron) -> tuple[Floats, Ints]:
     """Return corners (n, 3) in mm and faces (m, 3) of a body from a file."""
-    corners, faces = corners_and_faces(body)
-    return corners, faces.astype(np.int64)
+    corners = np.frombuffer(body.vertices, "<i4").reshape(-1, 3) / GRID_PER_MM
+    return corners, np.frombuffer(body.faces, "<i4").reshape(-1, 3).astype(np.int64)
