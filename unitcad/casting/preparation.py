@@ -12,6 +12,7 @@ from unitcad.casting.figures import (
 )
 from unitcad.casting.plates import made_pieces, mould_plates
 from unitcad.casting.resin import clean_resin, in_resin, plate_sentences
+from unitcad.casting.sentences import say
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import picture_path
 from unitcad.catalogue import Material, Printer, inhibitors
@@ -34,7 +35,7 @@ FOOT_MM = 0.2
 """Elephant foot compensation of a printer whose entry has none, mm."""
 MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
-GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
+GOOD_DEG = {"phone": 0.2, "spirit_level": 0.03}
 """Tilt that is left if the level reads none (assumed): two steps of a phone; a builder's level, turned end for end."""
 
 
@@ -54,16 +55,16 @@ def slicer_settings(moulds: MouldSet) -> dict[str, str]:
 
 def print_description(moulds: MouldSet) -> str:
     """Return the settings of the plates in words, the first layer's height among them, which no setting carries."""
-    said = [in_layers(moulds.spec.moulds)]
+    layers = in_layers(moulds.spec.moulds)
     if in_resin(moulds):
-        return f"Print in this attitude: {said[0]}; flat on the plate, no supports, no pad; casting.md has the wells"
-    said += [f"{key.replace('_', ' ')} {value}" for key, value in slicer_settings(moulds).items() if "layer" not in key]
-    return f"Print in this attitude: {'; '.join(said)}"
+        return say("print.attitude_resin", layers=layers)
+    own = (f"{key.replace('_', ' ')} {value}" for key, value in slicer_settings(moulds).items() if "layer" not in key)
+    return say("print.attitude_filament", settings="; ".join((layers, *own)))
 
 
 def in_layers(lengths: MouldsTable) -> str:
     """Write the layers of the printer."""
-    return f"layers {number(lengths.layer_mm, 3)}, first layer {number(lengths.first_layer_mm, 3)} mm"
+    return say("print.layers", layer=number(lengths.layer_mm, 3), first=number(lengths.first_layer_mm, 3))
 
 
 def foot_mm(printer: Printer) -> float:
@@ -122,39 +123,38 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     standing = plan.dimensions.core_height - moulds.plate[0]
     tallest = max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0, tallest_mm)
     minutes, cm3 = 5.0 * max(round(print_min(spec, solid_mm3, tallest) / 5), 1), solid_mm3 / 1000
-    takes = f"About {duration(minutes)}, at most {number(cm3, 2)} cm3 of"
+    time, most = duration(minutes), number(cm3, 2)
     names = [join_words(plan.called(one.name).replace(",", "") for one in plate) for plate in files.values()]
     there = "; ".join(f"{path} with {each}" for path, each in zip(files, names, strict=True))
-    plates = f"Plate: {there}"
-    if len(files) > 1:
-        plates = f"{len(files)} plates, since one bed does not hold all: {there}"
-    attitude = f" ({join_words(turned)} upside down)" if turned else ""
-    how = [f"{plates}. Print the pieces as they lie{attitude}, without supports."]
-    layers = f"Printer {lengths.printer}, {in_layers(lengths)}"
+    listed = "print.one_plate" if len(files) == 1 else "print.several_plates"
+    lie = "print.some_turned" if turned else "print.as_they_lie"
+    how = [say(listed, lie, count=len(files), plates=there, turned=join_words(turned) if turned else "")]
+    layers, printer = in_layers(lengths), lengths.printer
     if resin:
-        how.append(
-            f"{takes} resin. {layers}. Compensate the first layers' growth (bottom tolerance): it narrows a bore."
-        )
+        how.append(say("print.resin", time=time, cm3=most, printer=printer, layers=layers))
         how += plate_sentences(moulds)
     else:
-        foot = f", elephant foot compensation {number(foot_mm(printer_of(spec)), 3)} mm" if _has_foot(moulds) else ""
         low, high = (number(error, 2) for error in FDM_ERROR)
-        how.append(f"{takes} filament (a slicer says {low} to {high} times that).")
-        how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
-        first = number(lengths.first_layer_mm, 3)
-        how.append(f"Set the first layer to {first} mm in the slicer: no 3MF carries it, and heights depend on it.")
-    altered = []
-    if lengths.shrinkage_percent:
-        altered.append(
-            f"the tools are larger by {number(lengths.shrinkage_percent, 2)} %, for the silicone's shrinkage"
+        how.append(say("print.filament", time=time, cm3=most, low=low, high=high))
+        how.append(
+            say(
+                "print.settings_foot" if _has_foot(moulds) else "print.settings",
+                printer=printer,
+                layers=layers,
+                perimeters=PERIMETERS,
+                infill=INFILL_PERCENT,
+                foot=number(foot_mm(printer_of(spec)), 3),
+            )
         )
-    if lengths.bore_compensation_mm:
-        wider = number(lengths.bore_compensation_mm, 2)
-        altered.append(f"bores are wider by {wider} mm a side, which the printer takes away")
-    if altered:
-        how.append(f"In the files {', and '.join(altered)}.")
+        how.append(say("print.first_layer", first=number(lengths.first_layer_mm, 3)))
+    percent, wider = number(lengths.shrinkage_percent, 2), number(lengths.bore_compensation_mm, 2)
+    if lengths.shrinkage_percent:
+        altered = "print.larger_wider" if lengths.bore_compensation_mm else "print.larger"
+        how.append(say(altered, percent=percent, wider=wider))
+    elif lengths.bore_compensation_mm:
+        how.append(say("print.wider", wider=wider))
     if plan.of_kind("cup"):
-        how.append(f"New printer: print the fit coupon (unitcad coupon {lengths.printer}).")
+        how.append(say("print.fit_coupon", printer=printer))
     return Printing(
         sizes(moulds),
         moulds.source.file,
@@ -195,13 +195,20 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     own = [f"C{step.index:X} on {spaced(step.cup)}" for step in plan.steps]
     own += [f"L{step.index:X} on {spaced(step.lid)}" for step in plan.steps if step.lid]
     own += [f"F on the {plan.called(tray.name)}" for tray in plan.of_kind("tray")]
-    pieces = " Pieces of one tool have a number too." if plan.splits else ""
-    marks = f"{label[:2]} and {label[2:]} on {'cups and lids' if plan.of_kind('lid') else 'cups'}, {join_words(own)}"
+    marked = "sort.cups_and_lids" if plan.of_kind("lid") else "sort.cups"
     if any(len(plan.pieces_of(cup.name)) > 1 for cup in plan.of_kind("cup")):
-        marks = f"{join_words(own)}, and after it {label} where the piece has room"
+        marked = "sort.split_cups"
     yield BenchStep(
-        "Sort the pieces",
-        f"Engraved: {seen('B')}{label} on the base, {marks}.{pieces}",
+        say("sort.title"),
+        say(
+            marked,
+            "sort.split" if plan.splits else "",
+            base=f"{seen('B')}{label}",
+            first=label[:2],
+            second=label[2:],
+            own=join_words(own),
+            label=label,
+        ),
         picture_path("pieces"),
         minutes=5.0,
     )
@@ -209,11 +216,16 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     if cut and dims.exit:
         length = plan.layout.cup[0] - min(abs(c.x) for c in plan.layout.cells) + GRIP_GAP + GRIP_LENGTH
         yield BenchStep(
-            "Cut the tongues",
-            f"Cut {'one tongue' if len(cut) == 1 else f'{len(cut)} tongues'} of {number(length, 2)} x "
-            f"{number(dims.exit.width, 3)} mm from film or steel {number(dims.exit.height, 3)} mm thick, without burr, "
-            f"one end hollow to the ledge's radius of {number(dims.ledge_radius, 3)} mm. Fold tape over the other "
-            f"end's last {number(GRIP_LENGTH, 2)} mm: you pull by this tab.",
+            say("cut_tongues.title"),
+            say(
+                "cut_tongues.text",
+                tongues="one tongue" if len(cut) == 1 else f"{len(cut)} tongues",
+                length=number(length, 2),
+                width=number(dims.exit.width, 3),
+                height=number(dims.exit.height, 3),
+                radius=number(dims.ledge_radius, 3),
+                tab=number(GRIP_LENGTH, 2),
+            ),
             picture_path("pieces"),
             minutes=5.0 * len(cut),
             required_tools=("flat pliers", "adhesive tape"),
@@ -221,42 +233,39 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     yield from cleaning(moulds, silicones)
     yield from joining(moulds)
     required_tools = ("paper",)
-    fits = "Put each cup on the plinth once, dry; its cut corner lets it on one way only."
     standing, leaf = ribs(moulds.frame), leaf_mm(printer_of(spec))
+    fits = "dry_fit.plain"
     if plan.pins:
-        fits = (
-            "Put each cup over the pins once, dry; one pin stands off the square of the others, so it goes on one way "
-            "only. It must lie flat: no paper goes under it. If it rocks, cut off the first layer's bulge round pins "
-            "and holes and scrape both faces clean."
-        )
+        fits = "dry_fit.pins"
     elif standing and leaf:
-        fits = (
-            f"Press each cup onto the plinth once by hand, cut corner over cut corner. Its {len(standing)} ribs stand "
-            f"on leaves {number(leaf, 2)} mm thick, which bend and centre it; print a cup with a broken leaf again."
-        )
+        fits = "dry_fit.leaves"
     elif standing:
-        fits = (
-            "Press each cup onto the plinth once, dry, cut corner over cut corner, by hand or in a vice between two "
-            f"boards: its {len(standing)} ribs are crushed and centre it from then on."
-        )
+        fits = "dry_fit.ribs"
         required_tools = ("paper", "vice and two boards")
-    if not plan.pins:
-        fits += (
-            f" It sits if paper folded to {number(lengths.seat_relief_mm, 3)} mm goes under it on all four sides. If "
-            "it rocks, scrape plinth and seat clean."
-        )
-        fits += " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
     yield BenchStep(
-        "Try every cup, dry", fits, picture_path("dry-fit"), minutes=5.0 * cups, required_tools=required_tools
+        say("dry_fit.title"),
+        say(
+            fits,
+            "" if plan.pins else "dry_fit.paper",
+            "dry_fit.lids" if plan.of_kind("lid") and not plan.pins else "",
+            ribs=len(standing),
+            leaf=number(leaf, 2),
+            relief=number(lengths.seat_relief_mm, 3),
+        ),
+        picture_path("dry-fit"),
+        minutes=5.0 * cups,
+        required_tools=required_tools,
     )
     if plan.of_kind("filament"):
         several_rows = len({cell.y for cell in plan.layout.cells}) > 1
-        between = " If its groove ends under the plate, cut the bent end to length." if several_rows else ""
         yield BenchStep(
-            "Filament in",
-            "Bend each filament by a right angle, warm from hot water, one leg "
-            f"{number(dims.core_height - moulds.plate[0] + SPARE, 2)} mm long.{between} Push that leg up through the "
-            "core until the other is in the plate's groove. Trim it flush with the core's top.",
+            say("filament.title"),
+            say(
+                "filament.bend",
+                "filament.several_rows" if several_rows else "",
+                "filament.push",
+                length=number(dims.core_height - moulds.plate[0] + SPARE, 2),
+            ),
             picture_path("filament"),
             minutes=3.0 * cells,
             required_tools=("sharp knife",),
@@ -266,32 +275,27 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     cup = spaced(next((step for step in plan.steps if step.rim >= core - 1e-9), plan.steps[-1]).cup)
     enough, tool = fall(moulds)
     if plan.steps[-1].injected:
-        enough, tool = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents.", "level"
-    yield level(
-        f"Put the base in its final place, {cup} on it. Lay a level on the rim, along and across, and shim the base's "
-        f"corners with paper. {enough} Take {cup} off.",
-        tool,
-    )
+        enough, tool = say("level.vents", degrees=number(TILT_DEG, 2)), "level"
+    yield level(say("level.text", cup=cup, enough=enough), tool)
 
 
 def level(text: str, tool: str) -> BenchStep:
     """Say how level the mould must be, and how to see it."""
-    return BenchStep("Level the bench", text, minutes=5.0, required_tools=(tool, "paper"))
+    return BenchStep(say("level.title"), text, minutes=5.0, required_tools=(tool, "paper"))
 
 
 def kept_away(silicones: Iterable[Material]) -> str:
     """Return the sentence on surfaces that keep these silicones from curing; empty if none is known."""
     surfaces = inhibitors(silicones)
-    return f" Keep {join_words(surfaces)} away from them: this silicone does not cure there." if surfaces else ""
+    return f" {say('clean.inhibitors', surfaces=join_words(surfaces))}" if surfaces else ""
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
     """Describe how printed pieces get clean; `silicones` are those that a surface may keep from curing."""
     if not in_resin(moulds):
         yield BenchStep(
-            "Clean",
-            "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches."
-            f"{kept_away(silicones)}",
+            say("clean.title"),
+            say("clean.text") + kept_away(silicones),
             minutes=10.0,
             required_tools=("hand brush", "sharp knife"),
         )
@@ -304,12 +308,15 @@ def fall(moulds: MouldSet) -> tuple[str, str]:
     what, wide = moulds.plan.widest or ("cavity", 2 * moulds.dimensions.outer_radius)
     left = {name: wide * math.tan(math.radians(tilt)) for name, tilt in GOOD_DEG.items()}
     name = next((name for name, error in left.items() if error <= DENT), list(left)[-1])
-    turned, tool = (", turned end for end,", "spirit level") if name != "a phone" else ("", "level")
-    said = (
-        f"{name.capitalize()}{turned} is good enough: {number(GOOD_DEG[name], 2)} degrees leave "
-        f"{number(left[name], 1)} mm across the {what} of {number(wide, 3)} mm."
+    phone = name == "phone"
+    enough = say(
+        "level.phone" if phone else "level.spirit_level",
+        degrees=number(GOOD_DEG[name], 2),
+        error=number(left[name], 1),
+        area=what,
+        wide=number(wide, 3),
     )
-    return said, tool
+    return enough, "level" if phone else "spirit level"
 
 
 def joining(moulds: MouldSet) -> Iterator[BenchStep]:
@@ -319,31 +326,25 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         return
     called = {split.tool: plan.called(split.tool) for split in plan.splits}
     parts = join_words(f"{called[split.tool]} in {len(split.pieces)} pieces" for split in plan.splits)
-    (base, *cups), below = plan.splits, called[plan.splits[0].tool]
+    base, *cups = plan.splits
     upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]
-    play = number(base.seams[0].play, 2)
-    first = "left" if base.seams[0].across == "x" else "back"
-    text = (
-        f"Printed in pieces: {parts}, numbered from the {first}. Cut off the first layer's bulge along the "
-        "dovetails. Push each piece straight down onto its neighbour, dovetail into dovetail, until a fingernail feels "
-        "no step; scrape dovetails that jam. Seal each seam from outside, never on a face that silicone touches: tape "
-        f"over the underside of the {below} and over the seam's ends"
-    )
+    in_line = ""
     if upper:
-        in_line, at = "The pins hold the pieces of each cup in line", {seam.at for cup in cups for seam in cup.seams}
-        if any(seam.at in at for seam in base.seams):
-            in_line = (
-                "Where base and cup are cut at the same gap, only dovetails and tape align them: keep the base on one "
-                "flat board, and before each pour lay the blade's edge over that seam on the rim: no light may show "
-                "under it"
-            )
-        text += (
-            f"; petroleum jelly rubbed into the underside of {join_words(upper)}, flush. The tape stays on until the "
-            f"{below} is off. {in_line}"
-        )
+        at = {seam.at for cup in cups for seam in cup.seams}
+        in_line = "join.same_gap" if any(seam.at in at for seam in base.seams) else "join.pins"
     yield BenchStep(
-        "Join the pieces",
-        f"{text}. Trim the fin of {play} mm that silicone makes in a seam with the flash.",
+        say("join.title"),
+        say(
+            "join.text",
+            "join.seal_cups" if upper else "join.seal_base",
+            in_line,
+            "join.fin",
+            parts=parts,
+            first="left" if base.seams[0].across == "x" else "back",
+            base=called[base.tool],
+            cups=join_words(upper) if upper else "",
+            play=number(base.seams[0].play, 2),
+        ),
         picture_path("pieces"),
         minutes=3.0 * sum(len(split.pieces) - 1 for split in plan.splits),
         required_tools=("wide adhesive tape", *["petroleum jelly"] * bool(upper)),

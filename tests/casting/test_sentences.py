@@ -1,0 +1,94 @@
+"""The words of casting: every sentence of the files is used, every fact is given, and none is left in the code."""
+
+import ast
+import inspect
+from importlib import import_module
+from string import Formatter
+
+import pytest
+
+from unitcad.casting import sentences as words
+from unitcad.casting.sentences import sentences, written
+from unitcad.casting.troubles import Trouble
+from unitcad.errors import UnitcadError
+
+FILES = {"say": "casting/procedure.toml"}
+"""File of words by the name that writes them."""
+MODULES = ("casting.preparation", "casting.troubles")
+LONGEST = 40
+"""Characters of a text in the code: a title or a fact, no sentence."""
+
+
+def tree(module):
+    return ast.parse(inspect.getsource(import_module(f"unitcad.{module}")))
+
+
+def facts_in(file, name):
+    return {field for _, field, _, _ in Formatter().parse(sentences(file)[name]) if field}
+
+
+def texts_of(node, function):
+    """The texts that an argument may be: its own, and those that the function gives the variables in it."""
+    held = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
+    given = [each for each in ast.walk(function) if isinstance(each, ast.Assign | ast.AugAssign)]
+    for each in given:
+        targets = each.targets if isinstance(each, ast.Assign) else [each.target]
+        if held & {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}:
+            node = ast.Tuple([node, each.value])
+    return {each.value for each in ast.walk(node) if isinstance(each, ast.Constant) and isinstance(each.value, str)}
+
+
+def calls(module):
+    """Each call that writes sentences: its line, its file, the sentences that it may write, the facts given."""
+    for function in tree(module).body:
+        for call in ast.walk(function):
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in FILES:
+                file = FILES[call.func.id]
+                named = set().union(*(texts_of(each, function) for each in call.args)) & sentences(file).keys()
+                yield call.lineno, file, named, call
+
+
+def troubles_used():
+    told = next(each for each in tree("casting.troubles").body if isinstance(each, ast.AnnAssign))
+    names = [key.value for key in told.value.keys]
+    return {f"{name}.{field}" for name in names for field in Trouble.__dataclass_fields__}
+
+
+def test_every_sentence_is_used_and_every_fact_is_given():
+    used = {(FILES["say"], name) for name in troubles_used()}
+    for module in MODULES:
+        for line, file, named, call in calls(module):
+            place = f"{module}:{line}"
+            if not named:  # a trouble's field, by its name
+                assert module == "casting.troubles", place
+                continue
+            used |= {(file, name) for name in named}
+            given = {each.arg for each in call.keywords}
+            assert given == set().union(*(facts_in(file, name) for name in named)), place
+    assert used == {(file, name) for file in set(FILES.values()) for name in sentences(file)}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_no_sentence_is_left_in_the_code(module):
+    found = tree(module)
+    docs = {id(each.value) for each in ast.walk(found) if isinstance(each, ast.Expr)}
+    long = []
+    for node in ast.walk(found):
+        if isinstance(node, ast.JoinedStr):
+            long.append("".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            long.append(node.value)
+    assert [text for text in long if len(text) > LONGEST] == []
+
+
+def test_a_line_break_is_a_space_and_a_fault_is_told(monkeypatch):
+    text = {"step.one": "Cut {count} pieces."}
+    monkeypatch.setattr(words, "sentences", lambda _: text)
+    assert written("own.toml", "step.one", "", count=2) == "Cut 2 pieces."
+    with pytest.raises(UnitcadError, match=r"own.toml: has no sentence step.two"):
+        written("own.toml", "step.two")
+    for changed in ("Cut {number} pieces.", "Cut {} pieces.", "Cut {count pieces."):
+        text["step.one"] = changed
+        with pytest.raises(UnitcadError, match=r"own.toml: step.one: .*facts of this step: \{count\}"):
+            written("own.toml", "step.one", count=2)
+    assert "\n" not in sentences("casting/procedure.toml")["filament.push"]
