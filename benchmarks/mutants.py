@@ -45,6 +45,7 @@ LOADED = (
     "tests/test_spec_keys.py",
     "tests/whole/test_mistakes.py",
     "tests/whole/test_reference.py",
+    "tests/whole/test_inventory.py",
 )
 """Tests of the keys of a spec: their ranges are read when a module loads."""
 LEAST = 0.85
