@@ -14,7 +14,7 @@ from unitcad.errors import UnitcadError
 
 FILES = {"say": "casting/procedure.toml"}
 """File of words by the name that writes them."""
-MODULES = ("casting.preparation", "casting.troubles")
+MODULES = ("casting.preparation", "casting.pouring", "casting.troubles")
 LONGEST = 40
 """Characters of a text in the code: a title or a fact, no sentence."""
 
@@ -27,15 +27,22 @@ def facts_in(file, name):
     return {field for _, field, _, _ in Formatter().parse(sentences(file)[name]) if field}
 
 
+def values_of(name, function):
+    """The values that a function gives a variable."""
+    for node in ast.walk(function):
+        for target in node.targets if isinstance(node, ast.Assign) else ():
+            both = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+            for each, value in zip(target.elts, node.value.elts, strict=True) if both else [(target, node.value)]:
+                if any(isinstance(part, ast.Name) and part.id == name for part in ast.walk(each)):
+                    yield value
+
+
 def texts_of(node, function):
-    """The texts that an argument may be: its own, and those that the function gives the variables in it."""
+    """The texts that an argument may be: its own, and those of the variables in it."""
     held = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
-    given = [each for each in ast.walk(function) if isinstance(each, ast.Assign | ast.AugAssign)]
-    for each in given:
-        targets = each.targets if isinstance(each, ast.Assign) else [each.target]
-        if held & {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}:
-            node = ast.Tuple([node, each.value])
-    return {each.value for each in ast.walk(node) if isinstance(each, ast.Constant) and isinstance(each.value, str)}
+    nodes = [node, *(value for name in held for value in values_of(name, function))]
+    parts = (part for each in nodes for part in ast.walk(each))
+    return {part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str)}
 
 
 def calls(module):

@@ -362,7 +362,7 @@ def pocket_procedure(
             "the cores are covered. Prick bubbles with a pin.",
             "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke: it runs on rim "
             "and cores. The rest goes into the groove.",
-            " The film on the cores is trimmed at the end.",
+            "The film on the cores is trimmed at the end.",
             len(array.places),
             1,
             picture_path,
