@@ -67,7 +67,10 @@ def spec_page() -> str:
 
 
 def mesh_rules() -> str:
-    """Return a table of all rules of `unitcad check`, and a section for each, family by family."""
+    """Return a table of all rules of `unitcad check`, and a fold for each, family by family.
+
+    A phone shows no table: there the folds are the list of the codes.
+    """
     lines = [
         "# Mesh rules",
         "",
@@ -75,16 +78,31 @@ def mesh_rules() -> str:
         "`unitcad check --explain CODE` prints the same text.",
         "[Check meshes in CI](../how-to/checks-in-ci.md) shows how to run the rules.",
         "",
+        '<div class="wide" markdown>',
+        "",
         "| code | finding | severity |",
         "| --- | --- | --- |",
         *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.title} | {rule.severity} |" for rule in rules().values()),
+        "",
+        "</div>",
         "",
     ]
     for letter, family in FAMILIES.items():
         lines += [f"## {family}", ""]
         for rule in rules().values():
             if rule.code.startswith(letter):
-                lines += _rule(rule, "###")
+                title, *text = _rule(rule, "###")
+                lines += [
+                    "<details markdown>",
+                    '<summary markdown="block">',
+                    "",
+                    title,
+                    "",
+                    "</summary>",
+                    *text,
+                    "</details>",
+                    "",
+                ]
     return "\n".join(lines)
 
 

@@ -2,6 +2,7 @@
 
     python docs/pictures/make.py              unit, moulds and three pages, into this folder
     python docs/pictures/make.py --look DIR   the pages in light, dark and 390 pixels wide, into DIR
+    python docs/pictures/make.py --moving     only the moving picture of the live page, into this folder
 
 Needs the extras `serve` and `test`, and Chromium.
 """
@@ -45,6 +46,8 @@ from unitcad.validation import compound_kind, load  # noqa: E402
 
 ARRAY_PICTURES = {"skin-side": "patch-skin-side", "tools": "tools"}
 MOST_BYTES = 250_000
+MOST_MOVING = 1_000_000
+MOVING_PX = (960, 656)
 APART_MM = 14.0
 """Between two pieces of a box taken apart."""
 LOOKS = (("light", 1280, 900, False), ("dark", 1280, 900, True), ("narrow", 390, 844, False))
@@ -54,12 +57,16 @@ def main() -> None:
     """Make what was asked for; prints each file with its size."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--look", type=Path, metavar="DIR", help="screenshots of the pages into DIR")
-    look = parser.parse_args().look
+    parser.add_argument("--moving", action="store_true", help="only the moving picture of the live page")
+    given = parser.parse_args()
+    look = given.look
     with tempfile.TemporaryDirectory() as scratch:
         made = (
             screenshots(look, Path(scratch))
             if look
-            else {**pictures(), **gallery(), **arrays(), **pages(Path(scratch))}
+            else moving(Path(scratch))
+            if given.moving
+            else {**pictures(), **gallery(), **arrays(), **pages(Path(scratch)), **moving(Path(scratch))}
         )
     for name, content in sorted(made.items()):
         target = (look or HERE) / name
@@ -164,6 +171,46 @@ def live_page(running: Any, scratch: Path, looks: Sequence[tuple[str, int, int, 
             seen.page.evaluate("() => document.activeElement.blur()")
             yield scheme, seen.page.screenshot()
             seen.close()
+
+
+def moving(scratch: Path) -> dict[str, bytes]:
+    """The live page in use as an animated WebP: a wall grows, is refused and repaired, a design is picked, the moulds.
+
+    Screenshots of a running page, each as long as it takes to read. Raises ValueError past MOST_MOVING.
+    """
+    frames: list[tuple[Image.Image, int]] = []
+    with chromium.browser() as running, serving(scratch, "encapsulating") as server:
+        seen = Live(running, server, 1200, 820)
+
+        def shot(milliseconds: int) -> None:
+            seen.page.evaluate("() => document.activeElement.blur()")
+            image = Image.open(io.BytesIO(seen.page.screenshot())).convert("RGB")
+            frames.append((image.resize(MOVING_PX, Image.Resampling.LANCZOS), milliseconds))
+
+        shot(1800)
+        for wall, milliseconds in (("1.4", 700), ("1.6", 700), ("1.8", 900), ("2.5", 3500)):
+            seen.choose(WALL, wall)
+            shot(milliseconds)
+        seen.pressed(seen.page.get_by_role("button", name="Use diameter_mm"))
+        shot(2500)
+        count = len(seen.timings())
+        seen.page.select_option('select[name="design"]', "embedded")
+        seen.until(lambda: len(seen.timings()) > count)
+        seen.settled()
+        shot(3500)
+        seen.pressed(seen.page.get_by_role("button", name="Undo"))
+        seen.page.check('input[value="moulds"]')
+        seen.page.wait_for_timeout(500)
+        shot(3500)
+        seen.close()
+    made = io.BytesIO()
+    images, durations = zip(*frames, strict=True)
+    images[0].save(
+        made, "WEBP", save_all=True, append_images=images[1:], duration=list(durations), loop=0, quality=80, method=6
+    )
+    if len(made.getvalue()) >= MOST_MOVING:
+        raise ValueError(f"a moving picture of {len(made.getvalue())} bytes, {MOST_MOVING} at most")
+    return {"page-live.webp": made.getvalue()}
 
 
 def screenshots(look: Path, scratch: Path) -> dict[str, bytes]:

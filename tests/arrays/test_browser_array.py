@@ -60,6 +60,11 @@ def test_tools_are_shown_pour_by_pour_and_apart(visit):
     assert changed(together, canvas(visit)) > 0.05
 
 
+def test_print_has_pictures_and_no_controls(visit):
+    assert visit.printed_faults() == []
+    assert visit.page.locator("h2", has_text="Patch").is_visible()
+
+
 def test_a_unit_that_runs_code_has_no_3d_view(folder, tmp_path):
     copy = tmp_path / "copy"
     copy.mkdir()

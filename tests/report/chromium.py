@@ -107,6 +107,19 @@ class Visit:
             }"""
         )
 
+    def printed_faults(self):
+        """What a printed page has of controls and closed folds, and headings that a page may end with."""
+        self.page.emulate_media(media="print")
+        self.page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
+        return self.page.evaluate(
+            """() => [...document.querySelectorAll("button, input, select, textarea, details:not([open]), h2, h3, h4")]
+              .filter((node) => node.getClientRects().length && node.checkVisibility())
+              .filter((node) => !/^H/.test(node.tagName) || getComputedStyle(node).breakAfter !== "avoid"
+                || (node.parentElement.innerText.trim() === node.innerText.trim()
+                  && !node.parentElement.querySelector("canvas, img, svg, .plot")))
+              .map((node) => node.outerHTML.slice(0, 90))"""
+        )
+
     def picture(self, selector):
         """Take a picture (PNG) of where a part stands; one that is drawn again meanwhile may be another element."""
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")

@@ -98,6 +98,20 @@ def test_nothing_overflows_at_390_pixels(browser, sweep):
     seen.close()
 
 
+def test_print_has_the_table_and_no_controls(visit):
+    assert visit.printed_faults() == []
+    # The heads of the columns stay, as text: beside a box Chromium repeats no head on the next page.
+    assert visit.page.locator(".variants thead th").first.inner_text().strip() == "name"
+    assert (
+        visit.page.locator(".variants thead button").first.evaluate("(node) => getComputedStyle(node).display")
+        == "contents"
+    )
+    assert (
+        visit.page.locator(".variants .track").first.evaluate("(node) => getComputedStyle(node).printColorAdjust")
+        == "exact"
+    )
+
+
 def test_two_thousand_rows_come_in_pages(browser, tmp_path):
     rows = [["", f"v{i}", i * 7 % 2000, f"group {i % 3}", None] for i in range(2000)]
     seen = Visit(browser, table_page(tmp_path, ["name", "value", "group", "empty"], rows))

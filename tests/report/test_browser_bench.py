@@ -139,6 +139,39 @@ def test_a_timer_goes_on_through_a_reload(browser, page_of_one):
     visit.close()
 
 
+def test_one_hand_on_a_phone_goes_through_the_steps(browser, page_of_one):
+    """The step to do, its timer and two large buttons are at the lower edge; a locked screen loses nothing."""
+    visit = Visit(browser, page_of_one, 390, 844)
+    page, steps = visit.page, visit.page.locator("li.bench-step")
+    page.clock.install()
+    page.reload()
+    page.wait_for_selector("html[data-ready=yes]")
+    done, bar = page.get_by_role("button", name="Done"), page.locator("#now")
+    box = done.bounding_box()
+    assert box["height"] >= 56
+    assert box["width"] >= 200
+    assert box["y"] > 844 - 120
+    at = int(steps.filter(has=page.get_by_role("button", name="Start pot life")).first.get_attribute("data-step"))
+    mix = steps.nth(at)
+    for _ in range(at):
+        done.click()
+    assert page.locator("li.bench-step h3 input:checked").count() == at
+    assert bar.get_by_role("button").first.inner_text().endswith(" Mix")
+    assert mix.bounding_box()["y"] < 844 / 2
+    assert bar.locator(".clock").inner_text() in ("pot life 0:30:00", "pot life 0:29:59")
+    page.clock.fast_forward("10:00")  # a locked screen: ticks are lost
+    page.evaluate("() => document.dispatchEvent(new Event('visibilitychange'))")
+    assert bar.locator(".clock").inner_text().startswith("pot life 0:19:5")
+    page.clock.fast_forward("25:00")
+    page.reload()
+    page.wait_for_selector("html[data-ready=yes]")
+    assert bar.locator(".clock").inner_text().startswith("pot life over by 0:05:0")
+    assert bar.get_by_role("button").first.inner_text().endswith(" Mix")
+    page.get_by_role("button", name="Back").click()
+    assert page.locator("li.bench-step h3 input:checked").count() == at - 1
+    visit.close()
+
+
 def test_the_schedule_counts_back(browser, page_of_one):
     casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
     visit = Visit(browser, page_of_one)

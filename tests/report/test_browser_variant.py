@@ -265,6 +265,7 @@ def test_print_shows_the_procedure_and_not_the_controls(visit):
     visit.page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
     assert visit.page.locator("#procedure details:not([open])").count() == 0
     assert visit.page.locator("#procedure td", has_text="pot life").first.is_visible()
+    assert visit.printed_faults() == []
     for selector in ("nav", "#view", "#files", "#estimate", "button"):
         assert not visit.page.locator(selector).first.is_visible(), selector
 

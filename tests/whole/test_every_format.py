@@ -1,21 +1,18 @@
 """Every template and every spec of the gallery makes each kind of file, and each sheet of a drawing has outlines."""
 
-import base64
-import re
-import zlib
 from pathlib import Path
 
 import pytest
 
+from tests.drawn_sheets import faults
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
-from unitcad.export import drawing as sheet
-from unitcad.export.chart import coord
+from unitcad.export import lengths
+from unitcad.export.drawing import pages
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.pipeline import optional, unit
+from unitcad.pipeline import optional, workshop
 from unitcad.pipeline.plan import plan
 from unitcad.pipeline.result import Progress
-from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.write import build
 from unitcad.spec.raw import FORMATS
@@ -43,28 +40,23 @@ def subject_of(name, **changes):
         return load_subject(name, {f"unit.{key}": value for key, value in changes.items()})
 
 
-def pages(content):
-    """Return the codes of the pages of a PDF."""
-    streams = re.findall(rb"stream\r?\n(.+?)endstream", content, re.S)
-    return [zlib.decompress(base64.a85decode(each.strip().removesuffix(b"~>"))).decode("latin-1") for each in streams]
-
-
 @pytest.mark.parametrize("name", every_spec())
 def test_meshes_assemblies_and_drawings_of_every_spec(name):
     moulds = subject_of(name).moulds.blank
     for planned in plan(moulds, ("unit", "moulds"), ("stl", "3mf", "glb")):
         if planned.form in ("stl", "3mf", "glb"):
             assert len(planned.make()) > 84, planned.path
-    unit, *tools = pages(drawing(moulds, ("unit", "moulds")))
+    sheets = list(workshop.sheets(moulds, ("unit", "moulds"), "0" * 64))
+    for sheet, page in zip(sheets, pages(sheets), strict=True):
+        assert not list(faults(page)), sheet.facts[0][0]
     printed = [body for body in moulds.plan.pieces if body.made == "printed"]
-    assert len(tools) == len(printed)
-    for page, body in zip(tools, printed, strict=True):
-        # Two views are filled; sections and outlines have the piece's own width and height.
-        assert len(re.findall(r"\b[fB]\*?$", page, re.M)) >= 2, body.name
-        x0, y0, _, x1, y1, _ = bounds(realise(body.shape, moulds.segments, 1.0))
-        assert f"({coord(x1 - x0, 2)}) Tj" in page, body.name
-        assert f"({coord(y1 - y0, 2)}) Tj" in page, body.name
-    assert len(re.findall(r"\b[fB]\*?$", unit, re.M)) >= 2
+    for sheet, body in zip(sheets[1:], printed, strict=True):
+        x0, y0, z0, x1, y1, z1 = bounds(realise(body.shape, moulds.segments, 1.0))
+        sizes = [(one.name, one.value) for one in sheet.checks if one.name in ("length", "width", "height")]
+        named = dict(sizes[::-1])
+        assert [named[name] for name in ("length", "width", "height")] == pytest.approx(
+            [x1 - x0, y1 - y0, z1 - z0], abs=0.01
+        )
 
 
 @pytest.mark.long
@@ -83,7 +75,7 @@ def test_a_drawing_that_can_not_be_made_costs_the_drawing_and_a_sentence(fault, 
     def broken(*given, **named):
         raise fault
 
-    monkeypatch.setattr(sheet, "upright", broken)
+    monkeypatch.setattr(lengths, "heights", broken)
     monkeypatch.delenv("UNITCAD_TRACEBACK", raising=False)
     done = build(load_subject("embedded", {"output.formats": ["stl", "pdf"]}), tmp_path, only=("moulds",))
     assert done.ok
@@ -99,7 +91,7 @@ def test_a_lack_of_the_machine_ends_the_build(error, monkeypatch):
     def broken(*given):
         raise error
 
-    monkeypatch.setattr(unit, "drawing", broken)
+    monkeypatch.setattr(workshop, "sheets", broken)
     subject = load_subject("embedded", {"output.formats": ["pdf"]})
     with pytest.raises(type(error)):
         subject.make(("unit",), False, MemoryStore(), Progress())

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from docs.readme import HOME, README, home_block
+from unitcad.meshcheck.rules.registry import rules
 
 pytest.importorskip("material", reason="the site needs the extra docs")
 ROOT = Path(__file__).parents[2]
@@ -42,6 +43,9 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path):
     python = (ROOT / "docs/reference/python.md").read_text("utf-8")
     shown = (tmp_path / "site/reference/python.html").read_text("utf-8")
     assert shown.count("<h2 id=") == len(re.findall(r"(?m)^## ", python))  # no heading is lost in a block of code
+    rules_page = (tmp_path / "site/reference/mesh-rules.html").read_text("utf-8")
+    folds = re.findall(r"<details>\s*<summary>\s*<h3 id=\"(\w+)\"", rules_page)
+    assert folds == [code.lower() for code in rules()]  # a phone shows a line a rule, and each has its address
     for page in (ROOT / "docs").rglob("*.md"):
         assert (tmp_path / "site" / page.relative_to(ROOT / "docs").with_suffix(".html")).is_file(), page
         relative = page.relative_to(ROOT / "docs").as_posix()
@@ -50,6 +54,34 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path):
             or relative == "index.md"
             or f"]({relative})" in (ROOT / "docs" / "index.md").read_text("utf-8")
         ), f"the index of the docs lacks {relative}"
+
+
+WITHOUT_EXTRAS = """
+import importlib.metadata, re, sys, tomllib
+sys.path.insert(0, ".")
+project = tomllib.load(open("pyproject.toml", "rb"))["project"]
+def name(text): return re.split(r"[^A-Za-z0-9._-]", text)[0].lower()
+extras = project["optional-dependencies"]
+own = {name(one) for one in (*project["dependencies"], *extras["docs"])}
+others = {name(one) for each in extras.values() for one in each} - own - {"unitcad"}
+found = importlib.metadata.packages_distributions()
+gone = {module for module, dists in found.items() if {dist.lower() for dist in dists} & others}
+class Blocked:
+    def find_spec(self, module, *_):
+        if module.partition(".")[0] in gone:
+            raise ModuleNotFoundError(module)
+sys.meta_path.insert(0, Blocked())
+import docs.generated
+print(len(gone), len(docs.generated.pages()))
+"""
+
+
+def test_the_extra_docs_is_all_that_the_pages_need():
+    done = subprocess.run([sys.executable, "-c", WITHOUT_EXTRAS], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    blocked, made = map(int, done.stdout.split())
+    assert blocked > 5
+    assert made > 8
 
 
 def test_the_home_shows_what_the_readme_shows():

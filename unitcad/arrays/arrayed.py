@@ -35,6 +35,7 @@ from unitcad.arrays.circuit import crowded_tracks
 from unitcad.arrays.crosstalk import extras
 from unitcad.arrays.estimate_arrays import array_summary
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
+from unitcad.arrays.patch_sheet import array_sheets, without_sheet
 from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
 from unitcad.cache import Store, digest
@@ -46,6 +47,7 @@ from unitcad.checks.gap import play_missing
 from unitcad.documents import read_toml
 from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
+from unitcad.pipeline import workshop
 from unitcad.pipeline.geometry import geometric_result, record
 from unitcad.pipeline.make import make
 from unitcad.pipeline.manifest import (
@@ -71,7 +73,6 @@ from unitcad.pipeline.plan import (
     stl_content,
 )
 from unitcad.pipeline.result import Product, Progress, Result
-from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subject import Compound
 from unitcad.pipeline.unit import Unit
 from unitcad.spec import Spec
@@ -106,7 +107,7 @@ class Arrayed(Compound):
     write_page = staticmethod(write_array_page)
 
     def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
-        return array_summary(self.array, folder, manifest, self.given)
+        return array_summary(self.moulds, folder, manifest)
 
     @property
     def moulds(self) -> PatchMoulds:
@@ -135,9 +136,11 @@ class Arrayed(Compound):
         units = {
             folder: _unit(moulds, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()
         }
-        drawn = "pdf" in self.formats and "moulds" in only
-        if drawn and (page := optional.made(DRAWING, lambda: drawing(moulds, ("moulds",)))):
-            made.own[DRAWING] = page
+        if "pdf" in self.formats and {"unit", "moulds"} & set(only):
+            progress("drawing")
+            if drawn := optional.made(DRAWING, lambda: workshop.content([*array_sheets(moulds, only, self.hash)])):
+                made.own[DRAWING] = drawn
+                made.skipped += without_sheet(moulds) if "moulds" in only else []
         if moulded := [name for name in ("moulds", "casting") if name in only]:
             shape = geometric_result(moulds, moulded, check, store, progress)
             made.add(shape)
@@ -169,7 +172,7 @@ class Arrayed(Compound):
         more, lacking = extras(array, only)
         made.own |= more
         for folder, product in units.items():
-            made.add(product.below(folder))
+            made.add(product.below(folder, said_of_unit(array, unit_folders(array)[folder])))
         first = next(iter(units.values())).manifest
         made.air_ring_mm, made.estimate = first["air_ring_mm"], first["estimate"]
         made.skipped = [
@@ -188,6 +191,12 @@ def unit_folders(array: Array) -> dict[str, Spec]:
         slug = re.sub(r"[^a-z0-9]+", "-", unit.name.lower()).strip("-")[:40].rstrip("-") or "unit"
         named[f"units/{slug}" if f"units/{slug}" not in named else f"units/{slug}-{i + 1}"] = unit
     return named
+
+
+def said_of_unit(array: Array, unit: Spec) -> dict[str, str]:
+    """Return the sentences of a unit's heights, each with that one which names the keys of the array's file."""
+    own = MouldSet(unit)
+    return dict(zip(height_warnings(own), height_warnings(own, array.paths_of(unit)), strict=True))
 
 
 def _unit(

@@ -113,8 +113,7 @@ def section(
     """
     labels = [*notes]
     if named:
-        anchors = _anchors(regions, [text_width(region.name) for region in regions])
-        labels += (Note(region.name, at) for region, at in zip(regions, anchors, strict=True))
+        labels += names(regions)
     page = _Page(regions, measures, labels, px_per_mm)
     marks = [page.region(region) for region in regions]
     marks += page.frame(ground, level, both_ends)
@@ -132,6 +131,12 @@ def section(
     return "\n".join([head, *marks, "</svg>", ""])
 
 
+def names(regions: Sequence[Region]) -> list[Note]:
+    """Return the regions' names, each at a point well inside."""
+    anchors = _anchors(regions, [text_width(region.name) for region in regions])
+    return [Note(region.name, at) for region, at in zip(regions, anchors, strict=True)]
+
+
 def unit_section(
     bodies: Sequence[Body],
     dims: Dimensions,
@@ -141,23 +146,34 @@ def unit_section(
 ) -> str:
     """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named.
 
+    `concentric` as in `unit_view`; `px_per_mm` as in `section`.
+    """
+    regions, measures, notes = unit_view(bodies, dims, segments, concentric)
+    ground = "" if concentric and dims.skin else "skin"
+    return section(regions, measures, notes, ground=ground, px_per_mm=px_per_mm)
+
+
+def unit_view(
+    bodies: Sequence[Body], dims: Dimensions, segments: int, concentric: bool = True, tail: float = TAIL_MM
+) -> tuple[list[Region], list[Measure], list[Note]]:
+    """Return the unit's section in the plane y = 0, its main dimensions, and the name of the air in it.
+
     `concentric`: the layers are drawn to `dims`. Others get only the dimensions that are measured on their sections.
-    `px_per_mm` as in `section`.
+    `tail`: how far beyond the silicone a tail is drawn, mm.
     """
     if not concentric:
         measures = _measure(bodies, dims, segments)
         reach = max(
             (abs(x) for m in measures if m.side == "below" for x in (m.start, m.end)), default=dims.outer_radius
         )
-        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures, px_per_mm=px_per_mm)
-    regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
+        return cut(bodies, segments, reach=reach + tail), measures, []
+    regions = cut(bodies, segments, reach=dims.outer_radius + tail)
     notes = []
     if dims.air_ring > 0:
         low = dims.core_outline[-2][1]
         at = (dims.motor_radius + dims.cavity_radius) / 2, low + (dims.motor_height - low) / 3
         notes.append(Note("air", at))
-    ground = "" if dims.skin else "skin"
-    return section(regions, _unit_measures(dims), notes, ground=ground, px_per_mm=px_per_mm)
+    return regions, _unit_measures(dims), notes
 
 
 def _measure(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-from manifold3d import CrossSection, FillRule, Manifold, OpType
+from manifold3d import Manifold
 
-from unitcad.casting.resin import in_resin
-from unitcad.export import drawing as sheet
-from unitcad.export import svg
-from unitcad.export.chart import coord
 from unitcad.export.raster import Colour, Surface, draw
-from unitcad.kernels.mesh import arrays, bounds, realise
+from unitcad.kernels.mesh import arrays, bounds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.tree import Body
 from unitcad.text import spaced
@@ -24,12 +18,6 @@ GAP = 7.0
 """Between two pieces taken apart, mm."""
 ASIDE = 12.0
 """How far a tongue is drawn out when taken apart, mm."""
-
-LEAST_SIDE_MM = 1.5
-"""A side of an outline from above that is shorter than this gets no dimension: a facet of a circle is."""
-
-SECTIONS = 16
-"""Planes that are tried for the section of a piece without a cell."""
 
 Offset = tuple[float, float, float]
 
@@ -208,93 +196,3 @@ def _far_half(solid: Manifold, y: float = 0.0) -> Manifold:
 
 def _solid(solid: Manifold, colour: Colour, label: str = "") -> Surface:
     return Surface(*arrays(solid), colour, label)
-
-
-def drawing(moulds: MouldSet, only: Sequence[str]) -> bytes:
-    """Return the dimensioned drawing of the unit and of every tool that is printed, a sheet each, as PDF.
-
-    Raises Missing without reportlab.
-    """
-    spec, sheets = moulds.spec, list[sheet.Sheet]()
-    of_set = (("mould set", moulds.plan.label),) if "moulds" in only else ()
-    if "unit" in only:
-        solid = Manifold.batch_boolean([realise(one.shape, moulds.segments, 1.0) for one in moulds.unit], OpType.Add)
-        round_layers = moulds.design.tooling == "concentric"
-        section = partial(svg.unit_section, moulds.unit, moulds.dimensions, moulds.segments, round_layers)
-        silicones = ", ".join(f"layer {i} {layer.material}" for i, layer in enumerate(spec.layers, 1))
-        facts = ("piece", "unit"), ("variant", spec.name), *of_set, ("material", silicones)
-        sheets.append(sheet.Sheet((section, _plan_view(solid, 0.0)), facts))
-    for body in moulds.plan.pieces if of_set else ():
-        if body.made == "printed":
-            made = f"{'resin' if in_resin(moulds) else 'filament'}, printer {spec.moulds.printer}"
-            facts = ("piece", moulds.plan.called(body.name)), ("variant", spec.name), *of_set, ("material", made)
-            sheets.append(sheet.Sheet(_views(moulds, body), facts))
-    return sheet.content(sheets)
-
-
-def _views(moulds: MouldSet, body: Body) -> tuple[Callable[[float], str], ...]:
-    """Draw a tool cut through its first cell, with widths, heights and windows, and from above."""
-    # A polygon's corners on the circle: a round face is then as wide as it is drawn.
-    solid = realise(body.shape, moulds.segments, 1.0)
-    centre, y = _section_plane(moulds, body, solid)
-
-    def slices(z: float) -> Iterator[np.ndarray]:
-        return (np.asarray(loop) - (0.0, y) for loop in solid.slice(z).to_polygons())
-
-    def round_at(half: float, centre: float, z: float) -> bool:
-        for loop in slices(z):
-            x, y = loop[:, 0] - centre, loop[:, 1]
-            angles = np.sort(np.arctan2(y, x)[abs(np.hypot(x, y) - half) < 0.03])
-            if len(angles) >= 12 and max(np.diff(angles).max(), angles[0] - angles[-1] + 2 * np.pi) < 2:
-                return True
-        return False
-
-    def width_at(x: float, z: float) -> float | None:
-        inward = x - math.copysign(sheet.LEAST_EDGE_MM / 4, x)
-        ends = [
-            a[1] + (b[1] - a[1]) * (inward - a[0]) / (b[0] - a[0])
-            for loop in slices(z)
-            for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True)
-            if (a[0] > inward) != (b[0] > inward)
-        ]
-        above, below = [at for at in ends if at > 0], [at for at in ends if at <= 0]
-        return min(above) - max(below) if above and below else None
-
-    regions = svg.cut([body], moulds.segments, y=y, swell=1.0)
-    whole = CrossSection([np.array(loop) for region in regions for loop in region.loops], FillRule.EvenOdd)
-    loops = [[(float(x), float(z)) for x, z in loop] for loop in whole.simplify(sheet.SAME_MM / 4).to_polygons()]
-    measures = [*sheet.across(loops, (centre, 0.0), round_at), *sheet.upright(loops), *sheet.windows(loops, width_at)]
-    title = f"A - A, cut at y = {y:.4g}"
-    section = partial(svg.section, regions, measures, title=title, ground="seat", named=False)
-    return lambda scale: section(px_per_mm=scale), _plan_view(solid, y)
-
-
-def _section_plane(moulds: MouldSet, body: Body, solid: Manifold) -> tuple[float, float]:
-    """Return x of the first cell in a piece, and y of the plane through it.
-
-    A piece may not reach to the set's first cell. One without a cell is cut at its largest section.
-    """
-
-    def area(at: tuple[float, float]) -> float:
-        loops = [np.array(loop) for region in svg.cut([body], moulds.segments, y=at[1]) for loop in region.loops]
-        return float(CrossSection(loops, FillRule.EvenOdd).area()) if loops else 0.0
-
-    x0, y0, _, x1, y1, _ = bounds(solid)
-    cells = sorted(((cell.x, cell.y) for cell in moulds.plan.layout.cells), key=lambda at: not x0 < at[0] < x1)
-    middle = ((x0 + x1) / 2, (y0 + y1) / 2)
-    levels = [middle, *((middle[0], y0 + (y1 - y0) * i / SECTIONS) for i in range(1, SECTIONS))]
-    return next((at for at in cells if y0 < at[1] < y1 and area(at)), None) or max(levels, key=area)
-
-
-def _plan_view(solid: Manifold, y: float) -> Callable[[float], str]:
-    """Draw a solid from above, with its widths and the line of the section."""
-    seen, (x0, y0, _, x1, y1, _) = sheet.from_above(solid), bounds(solid)
-    outline = seen[0].loops
-    size = [svg.Measure(coord(x1 - x0, 2), x0, x1, "below", 0, y0)]
-    upright = [[(b, a) for a, b in loop] for loop in outline]
-    deep = sheet.across(upright, ((y0 + y1) / 2,), lambda *_: False, least=LEAST_SIDE_MM)
-    deep = [one for one in deep if one.end - one.start < y1 - y0 - sheet.SAME_MM]
-    for one in (*deep, svg.Measure(coord(y1 - y0, 2), y0, y1, "left", len(deep), x0)):
-        size.append(replace(one, side="left", reach=max(one.reach, x0)))
-    above = partial(svg.section, seen, size, title="from above", ground="A", named=False, level=y, both_ends=True)
-    return lambda scale: above(px_per_mm=scale)

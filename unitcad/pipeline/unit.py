@@ -15,12 +15,12 @@ from unitcad.designs import design_of
 from unitcad.designs.design import Reason
 from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
+from unitcad.pipeline import workshop
 from unitcad.pipeline.geometry import filed, geometric_result
 from unitcad.pipeline.manifest import DRAWING, NO_KERNEL, UNCHECKED, Manifest, Skipped
 from unitcad.pipeline.optional import OptionalFiles
 from unitcad.pipeline.plan import build_key, plan
 from unitcad.pipeline.result import Progress, Result
-from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subject import Subject
 from unitcad.pipeline.summary import unit_summary
 from unitcad.spec import Spec, spec_hash, to_json, to_toml, with_formats
@@ -59,7 +59,7 @@ class Unit(Subject):
         return Unit(with_formats(self.unit, tuple(formats)), self.given)
 
     def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
-        return unit_summary(self.unit, folder, manifest, self.given)
+        return unit_summary(self.moulds, folder, manifest)
 
     def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Result:
         spec, moulds, made = self.unit, self.moulds, Result()
@@ -68,7 +68,7 @@ class Unit(Subject):
         optional = OptionalFiles(made.skipped)
         if "pdf" in self.formats and {"unit", "moulds"} & set(only):  # its names are the spec's own
             progress("drawing")
-            if drawn := optional.made(DRAWING, lambda: drawing(moulds, only)):
+            if drawn := optional.made(DRAWING, lambda: workshop.content([*workshop.sheets(moulds, only, self.hash)])):
                 made.own[DRAWING] = drawn
         if "estimate" in only:  # first: the helper for STEP loads its kernel in the meantime
             from unitcad.pipeline.unit_estimate import estimated  # loads scipy

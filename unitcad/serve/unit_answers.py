@@ -15,7 +15,8 @@ from unitcad.designs import widths
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.heights import as_printed, height_warnings
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.report.page import cells
@@ -134,7 +135,14 @@ def _moulds(spec: Spec, answer: Answer) -> None:
         "moulds_apart": {name: list(offset) for name, offset in exploded_moves(moulds).items()},
     }
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
-    answer.lines = list(casting_summary(asdict(unit_procedure(moulds))))
+    answer.lines = [*printed_line(moulds), *casting_summary(asdict(unit_procedure(moulds)))]
+    answer.warnings = [*shallow_grooves(moulds), *height_warnings(moulds)]
+
+
+def printed_line(moulds: MouldSet, of: str = "The unit") -> Iterator[str]:
+    """Yield the heights that the printer makes, as a build's first line has them; nothing if they are as drawn."""
+    if made := as_printed(moulds):
+        yield f"{of} comes out {made}."
 
 
 def unit_procedure(moulds: MouldSet) -> Procedure:

@@ -107,14 +107,38 @@
       start.textContent = began ? "Start again from now" : `Start ${label}`;
     };
     const start = el("button", { type: "button", onclick: () => { state.began[name] = Date.now(); keep(); paint(); } });
-    timers.push(paint);
+    timers.push({ name, label, minutes, paint });
     return el("div", { className: "timer" }, el("span", {}, label), shown, start, ends);
   }
 
-  const paintTimers = () => { for (const paint of timers) paint(); };
+  function paintTimers() {
+    for (const { paint } of timers) paint();
+    const end = ({ name, minutes }) => state.began[name] + minutes * MINUTE;
+    const open = ({ name }) => state.began[name] && [...document.querySelectorAll("li.bench-step:not(.done)")].some((node) => node.dataset.timer === name);
+    const [next] = timers.filter(open).sort((one, other) => end(one) - end(other));
+    const over = Boolean(next) && Date.now() > end(next);
+    ahead.textContent = next ? `${next.label} ${over ? "over by " : ""}${remaining(end(next) - Date.now())}` : "";
+    ahead.classList.toggle("over", over);
+  }
+
+  // At the lower edge, for the thumb of the hand that holds the phone: the step to do, the timer that ends first, and a
+  // large button. `at` is the step's place in the list.
+  const ahead = el("output", { className: "clock", "aria-live": "off" });
+  const doing = el("button", { type: "button", className: "quiet", onclick: () => toStep() });
+  const back = el("button", { type: "button", onclick: () => tick(last()) }, "Back");
+  const done = el("button", { type: "button", className: "main", onclick: () => tick(current()) }, "Done");
+  const bar = el("div", { id: "now", className: "screen", role: "region", "aria-label": "The step to do" }, el("div", { className: "step-line" }, doing, ahead), el("div", { className: "presses" }, back, done));
+  const current = () => document.querySelector("li.bench-step[aria-current]");
+  const last = () => [...document.querySelectorAll("li.bench-step.done")].pop();
+  const toStep = () => (current() || document.getElementById("measure")).scrollIntoView({ block: "start" });
+
+  function tick(step) {
+    if (step) step.querySelector("input").click();
+    toStep();
+  }
 
   function card(step, at, pour) {
-    const own = [];
+    const own = [], before = timers.length;
     if (step.kind === "weigh") {
       const partB = el("p", { className: "part-b", role: "status" });
       const weigh = () => {
@@ -142,7 +166,7 @@
       paintTimers();
     } });
     const picture = data.pictures[step.picture];
-    return el("li", { className: `bench-step${step.short ? " repeated" : ""}`, value: at + 1, "data-step": String(at) },
+    return el("li", { className: `bench-step${step.short ? " repeated" : ""}`, value: at + 1, "data-step": String(at), "data-timer": timers.length > before ? timers[before].name : undefined },
       el("h3", {}, el("label", {}, ticked, el("span", { className: "count" }, `${at + 1}`), ` ${step.title}`)),
       picture && el("img", { className: again(at) ? "again" : undefined, src: picture, alt: step.title, width: "540" }),
       el("p", { className: "whole" }, step.text), step.short && el("p", { className: "as" }, step.short), own);
@@ -157,6 +181,9 @@
       if (node === now) node.setAttribute("aria-current", "step");
       else node.removeAttribute("aria-current");
     }
+    doing.textContent = now ? now.querySelector("h3").textContent : "All steps done: measure";
+    done.disabled = !now;
+    back.disabled = !last();
   }
 
   function plan() {
@@ -335,7 +362,8 @@
       list("release", "Out of the mould", casting.release, null),
       list("assembly", casting.last, casting.assembly, null),
       measure(), written(), troubles(), saving(),
-      el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing; what you enter stays in this browser.`)));
+      el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing; what you enter stays in this browser.`)),
+      data.steps.length > 0 && bar);
     mark();
     paintTimers();
   }

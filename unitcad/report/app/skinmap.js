@@ -354,7 +354,7 @@
     };
     const published = map.kinds[0].threshold;
     clear(host,
-      el("p", {}, several ? "Click a unit to switch it, or to turn its phase. The orange line is the threshold of touch." : "The orange line is the threshold of touch."),
+      el("p", {}, several && el("span", { className: "screen" }, "Click a unit to switch it, or to turn its phase. "), "The orange line is the threshold of touch."),
       el("div", { className: "tools" },
         choice("skin-view", VIEWS, "amplitude", (value) => { shown.view = value; if (value === "amplitude") shown.playing = false; settle(); }),
         el("span", { className: "buttons" }, play, cycle)),
