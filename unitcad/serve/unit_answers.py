@@ -22,11 +22,10 @@ from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.report.page import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
-from unitcad.spec import Spec, convert, to_data, to_toml
+from unitcad.spec import Spec, to_data, to_toml
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
-from unitcad.spec.raw import RawSpec
 from unitcad.validation import from_data, warnings
-from unitcad.validation.defaults import resolve
+from unitcad.validation.defaults import resolved
 from unitcad.validation.load import all_faults, sound_data
 from unitcad.validation.load import judge as judge
 
@@ -53,7 +52,7 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return the result of `judge`. Raises UnitcadError also for a unit that has no moulds."""
 
-    spec = resolve(convert(data, RawSpec))
+    spec = resolved(data)
     _ = MouldSet(spec).plan
     return to_data(spec)
 

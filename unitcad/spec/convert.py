@@ -35,7 +35,7 @@ _MOST_KEYS, _MOST_WORDS = 5, 8
 """Keys of a table, and words of a key, that a refusal names."""
 _SWITCH = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 """Texts that mean true or false."""
-SOURCES = frozenset({"design_source", "fit_source"})
+SOURCES = frozenset({"design_source", "file_source", "fit_source"})
 """The fields whose text has lines."""
 _MOST = 1_000_000
 """Entries of the largest record."""
