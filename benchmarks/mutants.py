@@ -45,6 +45,7 @@ LOADED = (
     "tests/test_spec_keys.py",
     "tests/whole/test_mistakes.py",
     "tests/whole/test_reference.py",
+    "tests/whole/test_inventory.py",
 )
 """Tests of the keys of a spec: their ranges are read when a module loads."""
 LEAST = 0.85
@@ -133,10 +134,13 @@ def tests_of(mutant: Mutant, running: dict[tuple[str, int], set[str]], copy: Pat
     return sorted(found, key=lambda name: (lines[name], name))
 
 
-def _node(context: str) -> str:
-    """Return pytest's name of a file, or of a test function from coverage's, such as tests.moulds.test_skin.test_a_film."""
+def _node(copy: Path, context: str) -> str:
+    """Return pytest's name of a file, or of a test function from coverage's, such as test_skin.test_a_film."""
+    if context in LOADED:
+        return context
     module, _, function = context.rpartition(".")
-    return context if context in LOADED else f"{module.replace('.', '/')}.py::{function}"
+    (file,) = (copy / "tests").rglob(f"{module.rpartition('.')[2]}.py")
+    return f"{file.relative_to(copy).as_posix()}::{function}"
 
 
 def _env(copy: Path) -> dict[str, str]:
@@ -151,11 +155,22 @@ def judged(copy: Path, mutant: Mutant, text: str, tests: Sequence[str]) -> Mutan
     before = path.read_text()
     path.write_text(text)
     try:
-        run = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(_node, tests[:MOST_TESTS])]
+        run = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            *(_node(copy, each) for each in tests[:MOST_TESTS]),
+        ]
         code = subprocess.run(
             run, cwd=copy, env=_env(copy), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=LIMIT_S
         ).returncode
-        why = "a test failed" if code == 1 else "it does not load" if code > 1 else "no test noticed"
+        if code not in (0, 1, 2):  # 2: the mutant does not load
+            raise RuntimeError(f"pytest ended with {code}: {' '.join(run)}")
+        why = ("no test noticed", "a test failed", "it does not load")[code]
         return replace(mutant, killed=code != 0, why=why)
     except subprocess.TimeoutExpired:
         return replace(mutant, killed=True, why="it hangs")

@@ -16,6 +16,7 @@ from typing import Any
 
 import typer
 from msgspec import Struct
+from msgspec.structs import FieldInfo
 
 import unitcad
 from docs.generated import FILES, tables
@@ -28,7 +29,7 @@ from unitcad.designs import shipped
 from unitcad.lab.record import RULES
 from unitcad.meshcheck.rules.registry import rules
 from unitcad.rooms import commands, file_kinds, load
-from unitcad.spec.fields import fields_of
+from unitcad.spec.fields import fields_of, values_of
 from unitcad.validation.load import shipped_of
 
 MODULES = ("unitcad", "unitcad.attenuation", "unitcad.arrays", "unitcad.shape", "unitcad.meshcheck", "unitcad.sweeps")
@@ -50,10 +51,11 @@ def inventory() -> dict[str, list[str]]:
 
 
 def page() -> str:
-    """Return the inventory as a page."""
+    """Return the inventory as a page, each number's key with its range."""
     lines = ["# Inventory", "", "Every name that a person can use. `python -m docs.inventory` writes this page."]
+    of = ranges()
     for section, entries in inventory().items():
-        lines += ["", f"## {section}", "", *(f"- `{entry}`" for entry in entries)]
+        lines += ["", f"## {section}", "", *(f"- `{one}`" + (f": {of[one]}" if one in of else "") for one in entries)]
     return "\n".join(lines) + "\n"
 
 
@@ -69,12 +71,24 @@ def _options() -> Iterator[str]:
                 yield from (f"{words} {option}" for option in parameter.opts if option.startswith("-"))
 
 
+def ranges() -> dict[str, str]:
+    """Return the range of every key of a file that takes a number in one."""
+    said = ((line, values_of(field.type)) for line, field in _fields())
+    return {line: values for line, values in said if re.search(r"\d", values)}
+
+
 def _keys() -> Iterator[str]:
+    yield from (line for line, _ in _fields())
+
+
+def _fields() -> Iterator[tuple[str, FieldInfo]]:
     for kind in FILES:
         for header, table in tables(load(kind.model)):
-            yield from (f"{kind.name}: {header} {key}".replace("  ", " ") for key in fields_of(table))
+            for key, field in fields_of(table).items():
+                yield f"{kind.name}: {header} {key}".replace("  ", " "), field
     for layout in layouts().values():
-        yield from (f'array: [layout] kind = "{layout.name}": {key}' for key in fields_of(layout.table))
+        for key, field in fields_of(layout.table).items():
+            yield f'array: [layout] kind = "{layout.name}": {key}', field
 
 
 def _shipped() -> Iterator[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 import re
 
-from unitcad.casting.pouring import LEVEL_AGAIN, TACK
+from unitcad.casting.sentences import say
 
 WORDS = {
     r"\bknife": "sharp knife",
@@ -138,7 +138,7 @@ def _cured(procedure):
             yield f"pour {pour.index}: the mould is opened before the cure"
         elif pour.steps[cures[0]].wait_min < 60 * pour.cure_h - 1e-6:
             yield f"pour {pour.index}: cures for less than the silicone takes"
-        elif TACK not in pour.steps[cures[0]].text:
+        elif say("cure.done") not in pour.steps[cures[0]].text:
             yield f"pour {pour.index}: nothing says how to tell cured silicone from tacky"
     fixed = any(
         "silicone adhesive" in step.required_tools or "fill the ring" in step.text for step in procedure.assembly
@@ -210,7 +210,7 @@ def _level_again(procedure):
     """Look at the level again once tape or bands run under the plate."""
     for pour in procedure.pours:
         cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
-        if cups and not any(LEVEL_AGAIN in step.text for step in pour.steps):
+        if cups and not any(say("hold.level_again") in step.text for step in pour.steps):
             yield f"pour {pour.index}: nothing says to look at the level again"
 
 

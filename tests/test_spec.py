@@ -152,7 +152,7 @@ def test_a_key_is_named_whatever_it_looks_like(key):
 
 
 def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are():
-    with pytest.raises(Refusal, match=r"known here: (\w+, ){4}\w+ and 13 more \(`unitcad schema` lists all\)"):
+    with pytest.raises(Refusal, match=r"known here: (\w+, ){4}\w+ and 14 more \(`unitcad schema` lists all\)"):
         load("encapsulating", ["xyz=1"])
     with pytest.raises(Refusal, match=r"unknown key; closest: wall_mm; nearest"):
         load("encapsulating", ["layers.0.walls_mm=1"])

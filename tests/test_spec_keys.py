@@ -1,5 +1,6 @@
 """Every key of a spec changes a written file or what the checks find: none is read by nothing."""
 
+import base64
 import copy
 import typing
 from functools import cache
@@ -9,6 +10,7 @@ from typing import Literal
 
 import msgspec
 import pytest
+from trimesh import creation
 
 from unitcad import catalogue
 from unitcad.cache import MemoryStore, digest
@@ -18,6 +20,7 @@ from unitcad.errors import Refusal
 from unitcad.pipeline.make import make
 from unitcad.pipeline.result import Progress
 from unitcad.pipeline.unit import Unit
+from unitcad.spec.body_file import on_grid
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
 from unitcad.spec.raw import OUTPUTS, RawSpec
@@ -45,6 +48,14 @@ def _fit_text():
     return Path(__file__).with_name("lab-fit.toml").read_text("utf-8")
 
 
+def _body_text(length):
+    box = creation.box((16, length, 7))
+    held = on_grid("", "layer1", box.apply_translation((0, 0, 3.5)).vertices, box.faces)
+    return " ".join(
+        ("unitcad bodies 1\nlayer1", *(base64.b64encode(part).decode() for part in (held.vertices, held.faces)))
+    )
+
+
 OTHERS = {
     "name": ("another",),
     "design": ("d.py:wide",),
@@ -64,6 +75,9 @@ OTHERS = {
     "printers.ours.bed_x_mm": (60.0,),
     "printers.ours.bed_y_mm": (40.0,),
     "design_source": (_SOURCE.replace("2.2", "2.4"),),
+    "motor.at": ([0.5, 0.0, 0.0],),
+    "body.file": ("other.stl",),
+    "body.file_source": (_body_text(17),),
     "estimate.fit": ("other.toml",),
     "estimate.fit_source": (_fit_text().replace("synthetic-bench", "another"),),
 }
@@ -135,6 +149,11 @@ def _bases():
             "design": "d.py:plain",
             "design_source": _SOURCE,
             "parameters": {"height_mm": 4.0},
+        },
+        "body": {
+            **{key: value for key, value in whole.items() if key not in ("design", "diameter_mm", "fpcb")},
+            "body": {"file": "box.stl", "file_source": _body_text(16)},
+            "layers": [{"material": "ecoflex-00-30"}, {"material": "ecoflex-00-30", "thickness_mm": 1.5}],
         },
     }
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from unitcad.errors import UnitcadError as UnitcadError
     from unitcad.pipeline.mass import MassProperties as MassProperties
     from unitcad.spec import Spec as Spec
+    from unitcad.spec.raw import BodyTable as Body
     from unitcad.spec.raw import CastingTable as Casting
     from unitcad.spec.raw import EstimateTable as Estimate
     from unitcad.spec.raw import FpcbTable as Fpcb
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Body",
     "BuildResult",
     "Casting",
     "CheckResult",
@@ -83,6 +85,7 @@ __all__ = [
 ]
 
 _PLACES = {
+    "Body": "spec.raw:BodyTable",
     "BuildResult": "api.build_call:BuildResult",
     "Casting": "spec.raw:CastingTable",
     "CheckResult": "api.check_call:CheckResult",

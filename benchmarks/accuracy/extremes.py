@@ -30,7 +30,7 @@ Job = tuple[str, dict[str, Any]]
 
 def run(quick: bool, say: Say) -> Result:
     """Run the sweeps and a sample of random specs; `study` takes any number."""
-    return study(16 if quick else 100, say, sweeps=2 if quick else None)
+    return study(8 if quick else 100, say, sweeps=1 if quick else None)
 
 
 def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None = None) -> Result:

@@ -8,10 +8,12 @@ import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.array_page import write_array_page
+from unitcad.arrays.arrayed import said_of_unit
 from unitcad.arrays.circuit import GAP_MM, TRACK_MM, crowded_tracks
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
+from unitcad.moulds.heights import as_printed, height_warnings
 from unitcad.moulds.mould_set import shallow_grooves
 from unitcad.pipeline.write import build as build_array
 
@@ -59,3 +61,26 @@ def test_manifest_and_page_say_it(tmp_path):
     page = write_array_page(built.folder, print).read_text("utf-8")
     assert escape(circuit) in page
     assert escape(groove) in page
+
+
+def test_an_array_names_the_keys_of_its_file():
+    """The suggestion without "unit." was an unknown key."""
+    said = height_warnings(patch_moulds(load_array("forearm-patch", ["moulds.first_layer_mm=0.3"])))
+    better = [line.split("; ")[1].split(" would")[0].replace(" = ", "=") for line in said]
+    assert better[0].startswith("unit.layers.0.cap_mm=")
+    assert height_warnings(patch_moulds(load_array("forearm-patch", ["moulds.first_layer_mm=0.3", *better]))) == []
+
+
+def test_a_placed_unit_of_another_kind_is_named_by_its_place():
+    given = {"array": "pockets", "layout": {"kind": "grid", "columns": 2, "rows": 1, "pitch_mm": 24.0}, "name": "two",
+             "unit": "encapsulating", "moulds": {"first_layer_mm": 0.35}, "sheet": {"thickness_mm": 2.0},
+             "place": [{"at": [2, 1], "unit": "no-fpcb"}]}  # fmt: skip
+    array = load_array(given)
+    said = [line for unit in array.units for line in said_of_unit(array, unit).values()]
+    assert any("; unit.layers.0.cap_mm = " in line for line in said)
+    assert any("; place.0.unit.layers.0.cap_mm = " in line for line in said)
+
+
+def test_a_curved_array_has_caps_only():
+    assert as_printed(patch_moulds(load_array("sleeve-curved"))) == "cap 1.2 mm (drawn 1.25)"
+    assert as_printed(patch_moulds(load_array("forearm-pockets"))) == ""

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -247,3 +248,12 @@ def test_details_have_every_table():
     shown = unitcad("estimate", "encapsulating", "--details").stdout
     for word in ("published", "corrected", "baseline", "5.17 and 4.58", "sideways", "input + 1 %"):
         assert word in shown
+    # The rule's row is not the answer's, and each kind of bracket is told.
+    rows = {
+        line.split("│")[1].strip(): line.split("│")[2].strip() for line in shown.splitlines() if line.count("│") > 3
+    }
+    level = re.search(r"Level at the edge: (\S+) % of the motor's amplitude (\(.*?\))\.", shown)
+    assert level
+    assert rows["answer"] == f"{level[1]} {level[2]}"
+    assert rows["rule, all units alike"] != level[1]
+    assert "of the answer its 80 % range, of a model the ends of its inputs' ranges" in " ".join(shown.split())

@@ -6,8 +6,8 @@ import pytest
 from casting_rules import broken_rules
 
 from tests.sample_bodies import LEADLESS
-from unitcad.casting.pouring import LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import procedure
+from unitcad.casting.sentences import say
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, templates
 
@@ -84,8 +84,8 @@ def reworded(old, new):
 
 
 greased_with_nothing_named = reworded("petroleum jelly", "something")
-NO_AGENT = "No release agent: what is cast here bonds later."
-tilted_by_tape = reworded(LEVEL_AGAIN, "")
+NO_AGENT = say("cup_on.no_agent")
+tilted_by_tape = reworded(say("hold.level_again"), "")
 
 
 def unbought(word):
@@ -179,7 +179,7 @@ PLANTED = {
     "not levelled": (("encapsulating",), without_step("Level the"), "levelled"),
     "opened before the cure": (("encapsulating",), opened_first, "opened before the cure"),
     "cured too short": (("encapsulating",), short_cure, "less than the silicone takes"),
-    "tacky is not told": (("embedded",), reworded(TACK, ""), "tacky"),
+    "tacky is not told": (("embedded",), reworded(say("cure.done"), ""), "tacky"),
     "adhesive not cured": (("encapsulating",), adhesive_left_wet, "what holds the motor is not cured"),
     "too little mixed": (("encapsulating",), too_little, "mixes less"),
     "syringe holds back": (LIDS, syringe_forgotten, "syringe holds back"),

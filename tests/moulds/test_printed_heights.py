@@ -1,5 +1,7 @@
 """Heights as printed: against meshes that are cut at the middle of each layer, as a slicer does."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from faulty_sets import set_of
@@ -10,7 +12,7 @@ from unitcad.checks import mould_checks
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import bounds
 from unitcad.moulds.heights import height_warnings, unit_heights
-from unitcad.pipeline.summary import as_printed
+from unitcad.pipeline.summary import unit_summary
 from unitcad.spec.layers import Layers
 from unitcad.validation import load
 
@@ -103,22 +105,15 @@ def test_the_first_layer_stands_beside_the_layers():
     assert preparation.print_description(moulds).startswith("Print in this attitude: layers 0.2, first layer 0.3 mm; ")
 
 
-def test_the_terminal_says_the_heights_that_the_printer_makes():
-    casting = {
-        "unit_heights": [
-            {"what": each.what, "asked_mm": each.asked_mm, "printed_mm": each.printed_mm}
-            for each in unit_heights(set_of("encapsulating"))
-        ],
-        "printing": {"layer_mm": 0.2},
-    }
-    assert as_printed(casting) == "4.6 mm high (drawn 4.61), caps 1.2 and 1.2"
-
-
-def test_a_curved_array_has_caps_only():
-    cap = {"what": "layer 1's cap", "asked_mm": 1.25, "printed_mm": 1.2}
-    casting = {"unit_heights": [{"what": "cavity", "asked_mm": 2.11, "printed_mm": 2.2}, cap]}
-    assert as_printed({**casting, "printing": {"layer_mm": 0.2}}) == "cap 1.2 mm (drawn 1.25)"
-    assert as_printed({"unit_heights": [], "printing": {"layer_mm": 0.2}}) == ""
+@pytest.mark.parametrize(("given", "line"), [((), "4.6 mm high (drawn 4.61), caps 1.2 and 1.2"), (
+    ("moulds.first_layer_mm=0.35",), "4.55 mm high (drawn 4.61), caps 1.15 and 1.2")])  # fmt: skip
+def test_the_terminal_says_the_heights_that_the_printer_makes(given, line):
+    moulds = set_of("encapsulating", *given)
+    manifest = {"outputs": ["unit", "moulds"], "casting": None, "estimate": None, "mould_checks": [], "steps": [],
+        "parts": [{"role": "unit", "made": "cast", "bbox_mm": [-7, -7, 0, 7, 7, 4.61], "name": "layer1", "material": None}],
+        "name": "one", "check": {"errors": 0, "warnings": 0, "findings": []}}  # fmt: skip
+    first = next(unit_summary(moulds, Path("none"), manifest))
+    assert line in first, "without a casting too"
 
 
 def test_a_first_layer_of_nothing_is_refused():

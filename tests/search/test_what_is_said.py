@@ -3,6 +3,7 @@
 import csv
 import html
 import itertools
+import re
 
 import pytest
 
@@ -61,7 +62,13 @@ def test_what_the_evidence_ranks_and_what_not_is_said(quiet):
     assert said[2] == f"not ranked by {unranked}, {line}"
     second = lines(quiet.data["proposals"][1])
     assert second[0] == "as likely as number 1; among equals the unit that is easier to make comes first"
-    assert said[2] in contents(quiet, "x")["design.html"].decode()
+    page = contents(quiet, "x")["design.html"].decode()
+    assert said[2] in page
+    # The level of each proposal is in the table, before its range; the measurement has its own column.
+    for one in quiet.data["proposals"]:
+        found = re.search(r"Level at the edge: (\S+) % of the motor's amplitude (\(.*?\))\.", one["edge"]["line"])
+        assert found
+        assert f'data-head="level, % (80 % range)">{found[1]} {found[2]}</td>' in page
 
 
 def test_the_ranking_has_the_proposals_numbers_and_the_measurements(quiet):

@@ -13,10 +13,12 @@ from running import serving
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_spec
+from unitcad.moulds.heights import height_warnings
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
 from unitcad.serve.application import values_of
-from unitcad.serve.messages import Field, Sweep
+from unitcad.serve.messages import Answer, Field, Sweep
+from unitcad.serve.unit_answers import ANSWERS
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load, templates
@@ -33,9 +35,17 @@ def test_answers_are_those_of_the_commands(server, name):
     judged = server.ask(text, "moulds")
     assert judged["checks"] == json.loads(json.dumps([finding.as_dict() for finding in check_moulds(moulds)]))
     assert base64.b64decode(judged["model"]["moulds"]) == glb_content(moulds, moulds.plan.tools)
-    assert len(judged["lines"]) == 2
+    assert [*judged["lines"]][-2].startswith("print ")
     if name == "encapsulating":
         assert server.ask(text, "estimate")["estimate"] == json.loads(json.dumps(estimate_spec(spec)))
+
+
+def test_the_moulds_come_with_the_printed_heights_and_their_warnings():
+    answer, spec = Answer(text=""), load("encapsulating", ["moulds.first_layer_mm=0.35"])
+    ANSWERS["moulds"](spec, answer)
+    assert answer.lines[0] == "The unit comes out 4.55 mm high (drawn 4.61), caps 1.15 and 1.2."
+    assert answer.warnings == height_warnings(MouldSet(spec))
+    assert "layer 1's cap comes out 1.15 mm for 1.25 (8 %)" in answer.warnings[0]
 
 
 def test_every_fault_is_told_with_its_line_and_what_would_do(server, text):

@@ -25,6 +25,13 @@ def test_every_template_is_shown_and_judged(live):
         assert f"layer{len(load(name).layers)}" in bodies, name
         assert live.page.locator("#estimate .lead").count() == 1, name
         assert live.page.locator("#section img").count() == 1
+        if name == "encapsulating":
+            assert "The unit comes out 4.6 mm high (drawn 4.61), caps 1.2 and 1.2. Print" in live.page.inner_text(
+                "#glance"
+            )
+            live.choose('input[name="moulds.first_layer_mm"]', "0.35")
+            assert live.state.endswith(", 1 warning")
+            assert "Warning: layer 1's cap comes out 1.15 mm for 1.25" in live.page.inner_text("#glance")
         assert live.page.locator(".spec-form .refusal:not(:empty)").count() == 0
 
 

@@ -2,8 +2,8 @@
 
 import re
 
-from docs.inventory import inventory, page
-from docs.released import listed, released
+from docs.inventory import inventory, page, ranges
+from docs.released import PAGE, listed, listed_ranges, released
 from tests.whole.page_examples import ROOT
 
 
@@ -24,6 +24,14 @@ def test_a_line_that_vanished_is_found_and_one_that_was_told_is_not():
     told = "## 0.2.0\n\n### Removed\n\n- `unitcad check --diff`: use a baseline.\n\n### Added\n\n- `G001`\n"
     assert _lost(was, {"unitcad check --quiet"}, told) == ["G001"]
     assert _lost(was, {"unitcad check --quiet"}, "") == ["unitcad check --diff", "G001"]
+
+
+def test_a_range_that_changes_is_told():
+    """A key's limits are those of the page, so that no limit moves without a line in a diff."""
+    before, now = listed_ranges(PAGE.read_text("utf-8")), ranges()
+    assert len(before) > 150
+    moved = {key: (before[key], now[key]) for key in before if key in now and now[key] != before[key]}
+    assert moved == {}, 'say it in "Changed" of CHANGELOG.md and run python -m docs.inventory'
 
 
 def test_the_page_lists_a_name_of_each_kind():

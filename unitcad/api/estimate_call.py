@@ -32,7 +32,8 @@ class EdgeEstimate:
     lines : list of str
         The level, the model behind it with its error, and the paper's analytic model, in words.
     models : dict of str to float or None
-        Level by each model that was asked for; None if a model gives no number.
+        Level by each model that was asked for, all units alike: the leading model's lacks the share of the own errors
+        of measured units near this one, which `level` has. None if a model gives no number.
     frequency_hz : float
         Frequency of the drive, Hz.
     data : dict
@@ -77,7 +78,7 @@ class EdgeEstimate:
 
     @property
     def models(self) -> dict[str, float | None]:
-        """The level by each model that was asked for; None if a model gives no number."""
+        """The level by each model that was asked for, all units alike; None if a model gives no number."""
         return {name: block["edge_level"].get("value") for name, block in self.data["models"].items()}
 
     @property

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 
 from msgspec import structs
@@ -34,6 +35,7 @@ from unitcad.casting.pouring import release as flat_release
 from unitcad.casting.pouring import shown as grams_shown
 from unitcad.casting.preparation import Printing, Size, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
+from unitcad.casting.sentences import say, written
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
 from unitcad.casting.troubles import troubles
 from unitcad.casting.views import picture_path, pour_picture
@@ -47,11 +49,19 @@ from unitcad.shape.lettering import seen
 from unitcad.spec import Spec
 from unitcad.text import join_words, number, spaced
 
+say_back_sheet = partial(written, "arrays/constructions/back_sheet.toml")
+say_curved = partial(written, "arrays/constructions/curved.toml")
+say_pockets = partial(written, "arrays/constructions/pockets.toml")
+
 
 def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
     """Return the steps of the assembly, each with its own title."""
     solder, lay_in, cure = steps
-    return replace(solder, title="Solder the motors"), replace(lay_in, title="Lay the circuit in"), cure
+    return (
+        replace(solder, title=say_back_sheet("motor_in.solder")),
+        replace(lay_in, title=say_back_sheet("motor_in.lay_circuit")),
+        cure,
+    )
 
 
 def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
@@ -76,7 +86,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         *_lid_on(moulds, step),
         *mixing_steps(batch),
         *injection_steps(batch, pour_picture(step.index, "inject")),
-        cure(batch, "the bead on a vent", "layer", pour_picture(step.index, "filled")),
+        cure(batch, say("cure.bead"), "layer", pour_picture(step.index, "filled")),
         _lid_off(moulds, step),
     )
     pours, prepared = (*flat_pours, pour_of(batch, steps)), (_sort_curved(moulds), *made.preparation[1:])
@@ -113,9 +123,15 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
     last = plan.steps[-1]
     cups = ", ".join(f"{spaced(step.cup)} (C{step.index:X})" for step in plan.steps[:-1])
     return BenchStep(
-        "Sort the pieces",
-        f"All are engraved {label}. Flat, for Layer 1: the base (b), {cups}. Curved, for the last pour: "
-        f"{_base(moulds)} (B{last.index:X}), {spaced(last.lid or '')} (L{last.index:X}).",
+        say("sort.title"),
+        say_curved(
+            "sort.text",
+            label=label,
+            cups=cups,
+            base=_base(moulds),
+            n=f"{last.index:X}",
+            lid=spaced(last.lid or ""),
+        ),
         picture_path("pieces"),
         minutes=5.0,
     )
@@ -125,45 +141,38 @@ def _laid_in(moulds: PatchMoulds, flat: MouldSet, inner: Material) -> Iterator[B
     """Return the steps by which the inner layers move from their flat base to the curved one."""
     units, base, step = len(moulds.array.places), _base(moulds), moulds.plan.steps[-1]
     lid = spaced(step.lid or "")
-    cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
+    cast = say_curved("layers_out.layer" if step.index == 2 else "layers_out.layers", last=step.index - 1)
     pulled = next(iter(flat_release(flat, inner)))
-    yield replace(pulled, title="Filament out of the flat base", picture=picture_path("flat-filament-out"))
+    yield replace(pulled, title=say_curved("flat_filament_out.title"), picture=picture_path("flat-filament-out"))
     yield BenchStep(
-        f"{cast} out",
-        f"Loosen the edge of each {cast} with a blunt spatula and peel it straight up. Their notches differ: lay each "
-        "on paper at its own place, turned as in the mould. Trim the flash with small scissors.",
+        say_curved("layers_out.title", layers=cast),
+        say_curved("layers_out.text", layers=cast),
         picture_path("flat-peel"),
         minutes=PEEL_MIN * units,
         required_tools=("small scissors", "blunt spatula", "paper"),
     )
     yield BenchStep(
-        f"Filament into {base}",
-        f"Cut {units} straight filaments, {_lengths(moulds)} mm long. Push one up through each core of {base} from "
-        f"below until it is flush with the underside. Put {base} on a flat board, so that none sinks. Trim the upper "
-        "ends flush with the cores' tops.",
+        say_curved("filament.title", base=base),
+        say_curved("filament.text", units=units, lengths=_lengths(moulds), base=base),
         pour_picture(step.index, "filament"),
         minutes=3.0 * units,
         required_tools=("sharp knife",),
     )
     yield BenchStep(
-        f"Level {base}",
-        f"Put {base} in its final place, {lid} on it, dry. Lay a level on {lid}, along and across, and shim the "
-        f"corners with paper. Within 5 degrees is good enough: so much the vents clear. Lift {lid} off.",
+        say_curved("level.title", base=base),
+        say_curved("level.text", base=base, lid=lid),
         minutes=5.0,
         required_tools=("level", "paper"),
     )
     yield BenchStep(
-        f"Wipe {cast}",
-        f"Wipe {cast} with isopropanol and let it dry. Its outside is the bond face: no release agent on it, ever, no "
-        "grease, no fingers.",
+        say_curved("wipe.title", layers=cast),
+        say_curved("wipe.text", layers=cast),
         minutes=2.0 * units,
         required_tools=("isopropanol and lint-free wipes",),
     )
     yield BenchStep(
-        f"Lay {cast} in",
-        f"Lay each over its core of {base}, A1 on A1, its notches over the fins. Press its edge down all round onto "
-        "the moat's floor, its top flat on the core: silicone that creeps under it fills the cavity's mouth. No "
-        "release agent, no grease on core or moat.",
+        say_curved("lay_in.title", layers=cast),
+        say_curved("lay_in.text", base=base),
         pour_picture(step.index, "laid-in"),
         minutes=LAY_IN_MIN * units / 2,
     )
@@ -186,10 +195,8 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
     lid, base = spaced(step.lid or ""), _base(moulds)
     slit = number(moulds.spec.moulds.seat_relief_mm, 3)
     yield BenchStep(
-        f"Lid {step.index} on",
-        f"Draw a thin line of petroleum jelly on the curved land of {base}, near its outer edge. Put {lid} on over the "
-        "pins, which let it on one way only. Press it down until it bears on the land all round; at both ends a slit "
-        f"of {slit} mm stays open.",
+        say("lid_on.title", n=step.index),
+        say_curved("lid_on.text", base=base, lid=lid, slit=slit),
         pour_picture(step.index, "lid-on"),
         minutes=LIFT_MIN,
         required_tools=("petroleum jelly",),
@@ -199,10 +206,8 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
 
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
     return BenchStep(
-        f"Lid {step.index} off",
-        "Remove its bands or clamp. Turn a screwdriver in the slit at either end, little by little, until "
-        f"{spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents tear off. Trim them flush with a "
-        "knife.",
+        say_curved("lid_off.title", n=step.index),
+        say_curved("lid_off.text", lid=spaced(step.lid or "")),
         pour_picture(step.index, "lid-off"),
         minutes=LIFT_MIN,
         required_tools=("sharp knife",),
@@ -213,17 +218,15 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Describe the way from the cured sheet to a sleeve in the hand."""
     units, base = len(moulds.array.places), _base(moulds)
     yield BenchStep(
-        "Filament out",
-        f"Lift the mould off the bench, lay {base} on its side. Take each filament with pliers in its pocket and pull "
-        "it out along itself. Never push it through.",
+        say("filament_out.title"),
+        say_curved("filament_out.text", base=base),
         picture_path("filament-out"),
         minutes=PULL_MIN * units,
         required_tools=("narrow pliers",),
     )
     yield BenchStep(
-        "Peel off",
-        "Loosen the sheet's edge all round with a blunt spatula. From one end, row after row, draw each unit off its "
-        "core square to the base at its place, as the picture shows. Trim the flash with small scissors.",
+        say("peel.title"),
+        say_curved("peel.text"),
         picture_path("peel"),
         minutes=PEEL_MIN * units,
         required_tools=("small scissors", "blunt spatula"),
@@ -232,12 +235,9 @@ def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
     yield moulds.plan.across
-    yield (
-        f"The sheet between the units: {grams_shown(moulds.array.sheet.thickness_mm, 2)} mm thick, at its four edges "
-        "and in its middle. A lid that did not sit down shows here."
-    )
+    yield say_curved("measure.sheet", thick=grams_shown(moulds.array.sheet.thickness_mm, 2))
     weights = " + ".join(grams_shown(each) for each in grams) + f" = {grams_shown(sum(grams))}"
-    yield f"Weigh one {moulds.plan.makes}, trimmed, without motors and circuit: {weights} g. Less means air."
+    yield say_curved("measure.weigh", makes=moulds.plan.makes, weights=weights)
 
 
 def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
@@ -245,14 +245,14 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
     places = len(moulds.array.places)
     for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
         if item.item == "filament":
-            size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
+            filament = number(moulds.spec.moulds.filament_mm, 3)
+            note = say_curved("filament.note", filament=filament, lengths=_lengths(moulds))
             yield replace(item, quantity=item.quantity - places)
-            yield Item("filament, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
+            yield Item(say_curved("filament.item"), places, "piece", "cut", note)
         else:
             yield item
 
 
-WIRE = "thin and insulated, two for each tail that ends under the sheet"
 ONCE = frozenset((name, unit) for name, (unit, _, _) in REQUIRED_TOOLS.items())
 """Things, by name and unit, of which one piece, dab or roll is enough for every casting: a roll of tape, no strips."""
 
@@ -264,7 +264,7 @@ def pocket_bill(
     silicone, mix, covered = batch.silicone, batch.mix, covered_tails(moulds.array)
     net = f"sheet: {number(mix.net_g, 3)} g net"
     # A motor has two poles.
-    wires = [Item("lead wire", 2 * len(covered), "piece", "bought", WIRE)] if covered else []
+    wires = [Item("lead wire", 2 * len(covered), "piece", "bought", say_pockets("wires.item"))] if covered else []
     own = [
         *(replace(item, note=f"for the sheet: {item.note}") for item in list_pieces(moulds)),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
@@ -344,13 +344,12 @@ def pocket_procedure(
     cast = tuple(_units(array, units))
     enough, level_tool = fall(moulds)
     prepared = (
-        BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=5.0),
+        BenchStep(say("sort.title"), _sort(moulds), picture_path("pieces"), minutes=5.0),
         *cleaning(moulds, [silicone]),
         *joining(moulds),
         # The sheet must not get thinner at one end by more than a dent.
         level(
-            "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
-            f"and across, and shim its corners with paper. {enough} Leave the tray there until it is cured.",
+            say_pockets("level.text", enough=enough),
             level_tool,
         ),
     )
@@ -358,16 +357,14 @@ def pocket_procedure(
         *mixing_steps(batch),
         *struck(
             batch,
-            "Pour in a thin thread, first along the wall and round every core, until it rises over the rim and "
-            "the cores are covered. Prick bubbles with a pin.",
-            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke: it runs on rim "
-            "and cores. The rest goes into the groove.",
-            " The film on the cores is trimmed at the end.",
+            say_pockets("pour.text"),
+            say_pockets("strike.text"),
+            say_pockets("strike.film"),
             len(array.places),
             1,
             picture_path,
         ),
-        cure(batch, "the silicone in the groove", "sheet", picture_path("filled")),
+        cure(batch, say("cure.groove", groove="the groove"), "sheet", picture_path("filled")),
     )
     out = tuple(_out(moulds))
     together = tuple(_together(array, moulds))
@@ -418,18 +415,25 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
     """Say how the units are made first: by their own procedures, as often as their mould has to be filled."""
     for i, (_, folder, unit, count, castings) in enumerate(kinds(array, units)):
         cavities = "one cavity" if unit.cells == 1 else f"{unit.cells} cavities"
-        filled = "one casting" if castings == 1 else f"{castings} castings, one after the other,"
-        take = "takes" if castings == 1 else "take"
         whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
         # One sheet is cast, at the same time as the first of them.
         after = duration(_first_cure(units)) if not i else ""
-        beside = f"Begin the sheet while their first pour cures, {after} from now." if after else ""
-        more = "" if unit.cells >= count else " More cavities (moulds.cavities) or a second set of moulds save days."
         yield BenchStep(
-            "Cast the units",
-            f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {filled} in moulds of {cavities} {take} "
-            f"{duration(castings * whole)}, of which {duration(castings * bench)} at the bench. "
-            f"{beside}{more} Try every motor.",
+            say_pockets("units.title"),
+            say_pockets(
+                "units.once" if castings == 1 else "units.again",
+                "units.beside" if after else "",
+                "" if unit.cells >= count else "units.more",
+                "units.motors",
+                count=count,
+                unit=unit.name,
+                folder=folder,
+                castings=castings,
+                cavities=cavities,
+                time=duration(castings * whole),
+                bench=duration(castings * bench),
+                after=after,
+            ),
             kind="cure",
             minutes=castings * bench,
             wait_min=castings * (whole - bench),
@@ -439,10 +443,13 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
 def _sort(moulds: PatchMoulds) -> str:
     tray = join_words(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base"))
     files = join_words(mould_plates(moulds))
-    printed = " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
-    return (
-        f"Print tray ({tray}){printed} as in {files}, without supports. The tray is engraved "
-        f"{seen(f'B{moulds.plan.label}')}."
+    printed = all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
+    return say_pockets(
+        "sort.tray_and_blade" if printed else "sort.tray",
+        "sort.mark",
+        tray=tray,
+        files=files,
+        mark=seen(f"B{moulds.plan.label}"),
     )
 
 
@@ -455,7 +462,7 @@ def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedu
         plates=(*sheet.plates, *files),
         minutes=sheet.minutes + sum(each.minutes for each in of_units),
         cm3=sheet.cm3 + sum(each.cm3 for each in of_units),
-        how=(*sheet.how, f"The units' moulds: {join_words(files)}, as their casting.md says."),
+        how=(*sheet.how, say_pockets("print.units", files=join_words(files))),
     )
 
 
@@ -471,10 +478,8 @@ def _sizes(array: Array, of_units: Sequence[Printing]) -> Iterator[Size]:
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
     thick = number(moulds.array.sheet.thickness_mm, 3)
     yield BenchStep(
-        "Peel off",
-        "Cut the sheet free from the groove's silicone along the land. Loosen a corner with a blunt spatula and peel "
-        f"the sheet off slowly, up over the cores: it is {thick} mm thick and tears at a notch. Trim the flash round "
-        "the pockets and strap slots with small scissors.",
+        say("peel.title"),
+        say_pockets("peel.text", thick=thick),
         picture_path("peel"),
         minutes=PEEL_MIN * 2,
         required_tools=("small scissors", "blunt spatula"),
@@ -485,10 +490,8 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Say how the units go in, and which way each one's tail points."""
     if covered := covered_tails(array):
         yield BenchStep(
-            "Wires on covered tails",
-            f"{counted(len(covered), 'tail')} would end under the sheet, at {named(covered)}. Nothing can be joined to "
-            "them once the units are in. Solder wires to the end of each now, long enough to reach beyond the sheet, "
-            "and try the motor again. They leave between sheet and skin.",
+            say_pockets("wires.title"),
+            say_pockets("wires.text", tails=counted(len(covered), "tail"), places=named(covered)),
             minutes=SOLDER_MIN * len(covered),
             required_tools=("soldering iron and solder",),
         )
@@ -501,19 +504,13 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
         f"{number(angle, 3)} degrees: {' '.join(place.name for place in places)}"
         for angle, places in groupby(ordered, key=lambda place: place.angle_deg)
     )
-    turned = (
-        " Turn each one until its tail points in its direction. Angles count counter-clockwise from the way along a "
-        f"row to the right, seen from the back: {ways}."
-        if any(unit.fpcb or unit.wires for unit in array.units)
-        else ""
-    )
+    turned = any(unit.fpcb or unit.wires for unit in array.units)
     over = number(array.sheet.low, 3)
     names = layouts()[array.layout["kind"]].naming
     yield BenchStep(
-        "Units in",
-        f"Lay the sheet down with its back up, as it came out of the tray. Push each unit up into its pocket from "
-        f"below, back first, until the pocket's lower edge is {over} mm over the unit's skin side all round: the "
-        f"pocket stretches by {stretch} and grips it. Water with a drop of soap helps; it dries.{turned} {names}",
+        say_pockets("units_in.title"),
+        say_pockets("units_in.text", "units_in.turn" if turned else "", over=over, stretch=stretch, ways=ways)
+        + f" {names}",
         picture_path("units-in"),
         minutes=PUSH_MIN * len(array.places),
     )
@@ -521,11 +518,11 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 def _measure(array: Array, grams: float, units: Mapping[str, Procedure]) -> Iterator[str]:
     sheet = array.sheet
-    yield f"Thickness of the sheet: {shown(sheet.thickness_mm, 2)} mm, at the middle and at the corners."
+    yield say_pockets("measure.sheet", thick=shown(sheet.thickness_mm, 2))
     for size in sorted({unit.diameter_mm for unit in array.units}):
-        yield f"A pocket for a unit of {shown(size, 2)} mm: {shown(size - 2 * sheet.hold_mm, 2)} mm across."
-    yield f"Weigh the sheet, trimmed: {shown(grams)} g. Less means air or a low strike."
-    yield "Each unit as its own procedure says, before it goes in."
+        yield say_pockets("measure.pocket", unit=shown(size, 2), pocket=shown(size - 2 * sheet.hold_mm, 2))
+    yield say_pockets("measure.weigh", grams=shown(grams))
+    yield say_pockets("measure.units")
 
 
 def array_procedure(

@@ -107,7 +107,7 @@ class Arrayed(Compound):
     write_page = staticmethod(write_array_page)
 
     def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
-        return array_summary(self.array, folder, manifest, self.given)
+        return array_summary(self.moulds, folder, manifest)
 
     @property
     def moulds(self) -> PatchMoulds:
@@ -172,7 +172,7 @@ class Arrayed(Compound):
         more, lacking = extras(array, only)
         made.own |= more
         for folder, product in units.items():
-            made.add(product.below(folder))
+            made.add(product.below(folder, said_of_unit(array, unit_folders(array)[folder])))
         first = next(iter(units.values())).manifest
         made.air_ring_mm, made.estimate = first["air_ring_mm"], first["estimate"]
         made.skipped = [
@@ -191,6 +191,12 @@ def unit_folders(array: Array) -> dict[str, Spec]:
         slug = re.sub(r"[^a-z0-9]+", "-", unit.name.lower()).strip("-")[:40].rstrip("-") or "unit"
         named[f"units/{slug}" if f"units/{slug}" not in named else f"units/{slug}-{i + 1}"] = unit
     return named
+
+
+def said_of_unit(array: Array, unit: Spec) -> dict[str, str]:
+    """Return the sentences of a unit's heights, each with that one which names the keys of the array's file."""
+    own = MouldSet(unit)
+    return dict(zip(height_warnings(own), height_warnings(own, array.paths_of(unit)), strict=True))
 
 
 def _unit(

@@ -2,44 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import typer
 from rich.text import Text
 
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_map import array_map
 from unitcad.arrays.crosstalk import CROSSTALK, crosstalk, ratio_line, ratios
+from unitcad.arrays.patch import PatchMoulds
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.output import print_indented, print_json, progress
 from unitcad.cli.tables import console, print_table
 from unitcad.documents import read_json
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
+from unitcad.moulds.heights import as_printed
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.summary import as_printed, assumed_line, checks_text, to_open
+from unitcad.pipeline.summary import MOULDED, assumed_line, checks_text, to_open
 from unitcad.report.map_file import MapFile
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
 
-def array_summary(array: Array, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
-    """Yield a line each: units, size and checks, lengths to measure, casting, crosstalk, the page; `given`: as for
-    a unit's summary.
-    """
+def array_summary(moulds: PatchMoulds, folder: Path, manifest: Manifest) -> Iterator[str]:
+    """Yield a line each: units, size and checks, lengths to measure, casting, crosstalk, the page."""
+    array, moulded = moulds.array, MOULDED & set(manifest["outputs"])
     box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
-    made = as_printed(read_json(folder / "casting.json")) if manifest["casting"] else ""
+    made = as_printed(moulds) if moulded else ""
     thick = f"{number(array.sheet.thickness_mm, 3)} mm thick{f', {made}' if made else ''}"
     yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {thick}{checks_text(manifest)}"
-    for own in sorted(folder.glob("units/*/casting.json")) if manifest["casting"] else ():
-        if made := as_printed(read_json(own)):
-            yield f"unit {own.parent.name} is {made}"
+    for unit in array.units if moulded and moulds.construction.own_tails else ():
+        if made := as_printed(MouldSet(unit)):
+            yield f"unit {unit.name} is {made}"
     for unit in array.units:
-        yield from assumed_line(unit, given, array.paths_of(unit)[0])
+        yield from assumed_line(unit, moulds.given, array.paths_of(unit)[0])
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = casting_summary(read_json(folder / "casting.json"), manifest["files"])

@@ -15,7 +15,7 @@ from unitcad.arrays.array_file import array_of, expand, makeable_array, sound_ar
 from unitcad.arrays.array_page import WORDS, patch_model, tools_model
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
-from unitcad.arrays.arrayed import unit_folders
+from unitcad.arrays.arrayed import said_of_unit, unit_folders
 from unitcad.arrays.crosstalk import crosstalk, heat_map_svg, patch_map_svg
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import patch_moulds
@@ -23,13 +23,15 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import casting_summary
 from unitcad.catalogue import materials
 from unitcad.checks import check_moulds, check_unit
+from unitcad.checks.gap import play_missing
 from unitcad.documents import line_of
 from unitcad.errors import Refusal
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.heights import height_warnings
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import has_code as unit_holds_code
-from unitcad.serve.unit_answers import unit_procedure
+from unitcad.serve.unit_answers import printed_line, unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.raw import Table
 from unitcad.spec.toml import from_json, to_json
@@ -159,15 +161,22 @@ def _tools(array: Array, answer: Answer) -> None:
     moulds = patch_moulds(array)
     answer.model = tools_model(array)
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
-    for folder, unit in unit_folders(array).items():
-        found = _checked(to_json(unit), moulds.construction.own_tails)
-        answer.checks += [{**finding, "where": f"{folder}: {finding['where']}"} for finding in found]
+    answer.warnings = [*shallow_grooves(moulds), *height_warnings(moulds), *play_missing(moulds)]
     apart = unit_folders(array) if moulds.construction.own_tails else {}
+    for folder, unit in unit_folders(array).items():
+        found, said = _checked(to_json(unit), folder in apart), said_of_unit(array, unit) if folder in apart else {}
+        for finding in found:
+            advice = said.get(finding["advice"], finding["advice"])
+            answer.checks.append({**finding, "where": f"{folder}: {finding['where']}", "advice": advice})
+        answer.warnings += [f"{folder}: {line}" for line in said.values()]
     volumes = [sum(solid.volume() for solid in moulds.meshes(step.layer)) for step in moulds.plan.steps]
     of_units = {name: _cast(to_json(unit)) for name, unit in apart.items()}
     made = array_procedure(moulds, volumes, 0.0, of_units)
     tools = ", ".join(tool.name for tool in moulds.plan.tools)
-    answer.lines = [*casting_summary(asdict(made)), f"Tools of the sheet: {tools}"]
+    printed = [*printed_line(moulds, "The sheet")]
+    for unit in apart.values():
+        printed += printed_line(MouldSet(unit), f"Unit {unit.name}")
+    answer.lines = [*printed, *casting_summary(asdict(made)), f"Tools of the sheet: {tools}"]
 
 
 @lru_cache(maxsize=8)

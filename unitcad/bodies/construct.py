@@ -49,10 +49,10 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     `first` is the tooling by complement, or its refusal; `planned` makes a plan of a tooling. Raises Refusal if no way
     can be drawn.
     """
-    if design_of(spec).laid_in:
-        return _or_raise(first)
     if len(cast) > 1:
         return _closed(spec, cast, first, planned) if isinstance(first, Refusal) else first
+    if design_of(spec).laid_in:
+        return _or_raise(first)
     tried = [_AS_DRAWN]
     if isinstance(first, Tooling):
         failed = _failed(spec, planned(first))

@@ -182,9 +182,9 @@ def _print_faults(manifest: Manifest) -> None:
             warn(f"note: STEP left out: {entry['reason']}; {install_step()}")
         if entry["reason"].startswith(UNMADE):
             warn(f"warning: {entry['output']} {entry['reason']}")
-    checks = manifest["mould_checks"]
+    checks, warned = manifest["mould_checks"], tuple(manifest["warnings"])
     for check in checks:
-        if check["ok"] and check["advice"] and check["advice"] not in manifest["warnings"]:
+        if check["ok"] and check["advice"] and not any(line.endswith(check["advice"]) for line in warned):
             warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}".rstrip() + f", limit {check['limit']:.3g}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from unitcad.attenuation.edge.words import ALIKE, BRACKETS, level_cell
 from unitcad.cli.output import level, print_indented
 from unitcad.cli.tables import print_table
 from unitcad.text import join_words, number
@@ -24,6 +25,7 @@ def _print_details(data: dict[str, Any]) -> None:
     """Print the models side by side, the layered curve, the inputs that count, and the assumptions."""
     if data["models"]:
         print_table(_models(data))
+        print_indented(BRACKETS)
         if "fit" in data:
             print_indented(_fit_line(data["fit"]))
     layered = data["layered"]
@@ -102,11 +104,12 @@ def _models(data: dict[str, Any]) -> Rows:
             **{f"% of an all-{control} unit's": ratios.get(control, "-") for control in controls},
         }
 
-    rows = []
+    rows = [row("answer", level_cell(answer["level"], answer["low"], answer["high"]))]
     for name, block in blocks.items():
         ends: dict[str, Any] = block.get("predictive") or {}
         spread = "-" if ends.get("p10") is None else f"{100 * ends['p10']:.3g} to {100 * ends['p90']:.3g}"
-        rows.append(row(name, level(block["edge_level"], 100), spread, block))
+        named = name + ALIKE * (name == answer["source"]["model"])
+        rows.append(row(named, level(block["edge_level"], 100), spread, block))
     rows.append(row("baseline", f"{100 * answer['kind_mean']:.3g} ({answer['kind']})"))
     for own in data.get("own_measured", ()):
         rows.append(row("measured here", level(own, 100), f"{own['unit']}, {own['frequency_hz']:g} Hz"))

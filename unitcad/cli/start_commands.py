@@ -136,7 +136,10 @@ def list_(
     ] = None,
     cupboard: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Only entries of a file of what you own, and its own ones. Default: all."),
+        typer.Option(
+            metavar="FILE",
+            help="Only entries that a file of what you own names, and its own. A kind not named: all.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -198,8 +201,13 @@ def _bounds(value: dict[str, Any]) -> str:
 
 
 def _values(entries: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of entries, each with its status and source: those of an own entry may be the defaults."""
     return {
-        name: {key: value for key, value in to_builtins(entry).items() if isinstance(value, dict)}
+        name: {
+            key: {"value": value["value"], "status": own.status, "source": own.source, **value}
+            for key, value in to_builtins(entry).items()
+            if isinstance(value, dict) and (own := getattr(entry, key))
+        }
         for name, entry in entries.items()
     }
 

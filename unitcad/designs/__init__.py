@@ -59,6 +59,10 @@ def shipped() -> dict[str, Design]:
 
 def design_of(spec: RawSpec) -> Design:
     """Return the design of a spec. Raises Refusal for an unknown one, UnitcadError for a custom one that fails."""
+    if spec.body:
+        from unitcad.designs.offset.layers import layered  # numpy and manifold3d: most specs do without
+
+        return layered(spec.body)
     if is_custom(spec.design):
         return custom(spec.design, spec.design_source or "")
     if spec.design.endswith(".py"):

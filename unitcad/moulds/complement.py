@@ -32,6 +32,7 @@ from unitcad.kernels.mesh import (
     gap,
     realise,
     segment_count,
+    shells,
     thick_parts,
     thick_pieces,
     widest,
@@ -133,8 +134,9 @@ def complement(spec: Spec, cast: Sequence[Shape], roof: float = 0.0, gates: Chan
         bores, holes = in_cells([under]), in_cells(slid)
         drilled = in_cells([shape for shape, _ in gated[i]])
         cup = cut(blank, [recess(frame), *bores, *holes, *overflow, *drilled])
-        parted = _pieces(realise(cup, segments), least)
-        if len(parted) > 1:
+        parted = shells(realise(cup, segments))
+        if len(parted) > 1:  # pieces, or films
+            parted = _pieces(realise(cup, segments), least)
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
             elsewhere = [realise(shape, segments) for shape in (cup, base, *in_cells(hung[i]))]
             for lost in _pieces(Manifold.batch_boolean([Manifold.compose(parted), *elsewhere], OpType.Subtract), least):
@@ -258,9 +260,10 @@ def _carried(
 def films(spec: Spec) -> float:
     """Return the thickness up to which a piece is a film of facets or rounding, mm.
 
-    In a body from a file, facets on either side of a film are each off the surface that was meant, and on the grid.
+    In a body from a file, facets on either side of a film are each off the surface that was meant, and on the grid; those
+    of a layer by offset are off twice, by its lattice and as they are joined.
     """
-    return 2 * (FACETS + LEVEL) if is_body_file(spec.design) else FACETS
+    return 2 * (FACETS * (2 if spec.body else 1) + LEVEL) if is_body_file(spec.design) else FACETS
 
 
 def _pieces(solid: Manifold, least: float) -> list[Manifold]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from msgspec import structs
@@ -12,7 +13,7 @@ from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec, printer_of
 from unitcad.spec.layers import layers_of
-from unitcad.text import number
+from unitcad.text import join_words, number
 
 NEAR = 0.02
 """Share of a layer within which a height counts as on the grid."""
@@ -51,6 +52,24 @@ def unit_heights(moulds: MouldSet) -> list[Height]:
 TONGUE = "tongue's thickness"
 
 
+def as_printed(moulds: MouldSet) -> str:
+    """Write the height over all and the caps as the printer makes them; "" if it makes them as drawn.
+
+    A curved array has no height over all.
+    """
+    heights = unit_heights(moulds.inner or moulds)
+    total = next((each for each in heights if each.what == OVER_ALL and not moulds.inner), None)
+    caps = [each for each in heights if each.what.endswith("'s cap")]
+    near, known = NEAR * moulds.spec.moulds.layer_mm, [*([total] if total else []), *caps]
+    if all(abs(each.printed_mm - each.asked_mm) <= near for each in known):
+        return ""
+    drawn, printed = [number(each.asked_mm, 3) for each in known], [number(each.printed_mm, 3) for each in known]
+    named = f"cap{'s' * (len(caps) > 1)} {join_words(printed[-len(caps) :])}" if caps else ""
+    if total is None:
+        return f"{named} mm (drawn {join_words(drawn)})"
+    return f"{printed[0]} mm high (drawn {drawn[0]}){f', {named}' if named else ''}"
+
+
 def off_layers(moulds: MouldSet) -> list[Height]:
     """Return those of them that whole layers change."""
     layer = moulds.spec.moulds.layer_mm
@@ -74,8 +93,11 @@ class Miss:
     said: str
 
 
-def missed(moulds: MouldSet) -> list[Miss]:
-    """Return the heights that come out of the printer more than `MOST_ERROR` off, each with a remedy."""
+def missed(moulds: MouldSet, paths: Sequence[str] = ()) -> list[Miss]:
+    """Return the heights that come out of the printer more than `MOST_ERROR` off, each with a remedy.
+
+    `paths`: of the unit in its file, such as "place.2.unit."; none: that of the set.
+    """
     wrong = [each for each in off_layers(moulds) if each.error > MOST_ERROR + 1e-9]
     layer = _better_layer(moulds) if wrong else None
     first, height = (number(each, 3) for each in (moulds.spec.moulds.first_layer_mm, moulds.spec.moulds.layer_mm))
@@ -86,7 +108,8 @@ def missed(moulds: MouldSet) -> list[Miss]:
         if rest.endswith("'s cap"):
             number_of = int(rest.partition("'")[0]) - 1
             if cap := _better_cap(moulds, number_of, each):
-                ways.append(f"layers.{number_of}.cap_mm = {number(cap, 3)}")
+                at = (f"{path}layers.{number_of}.cap_mm" for path in paths or [moulds.source.path])
+                ways.append(f"{join_words(list(at))} = {number(cap, 3)}")
         if layer:
             ways.append(f"moulds.layer_mm = {number(layer, 3)}")
         right = f"; {' or '.join(ways)} would print right" if ways else ""
@@ -98,9 +121,12 @@ def missed(moulds: MouldSet) -> list[Miss]:
     return found
 
 
-def height_warnings(moulds: MouldSet) -> list[str]:
-    """Return a sentence for each height that comes out wrong, and for a film that closes an open ring."""
-    said = [miss.said for miss in missed(moulds)]
+def height_warnings(moulds: MouldSet, paths: Sequence[str] = ()) -> list[str]:
+    """Return a sentence for each height that comes out wrong, and for a film that closes an open ring.
+
+    `paths`: as for `missed`.
+    """
+    said = [miss.said for miss in missed(moulds, paths)]
     film = film_mm(moulds)
     if film > SHORT:
         layer = number(moulds.spec.moulds.layer_mm, 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -115,19 +115,25 @@ class Product:
         for path, content in self.own.items():
             files.write_new(inside + path, content)
 
-    def below(self, folder: str) -> Result:
-        """Return the parts, files, findings and warnings as those of a result that has this one in a folder."""
+    def below(self, folder: str, said: Mapping[str, str]) -> Result:
+        """Return the parts, files, findings and warnings as those of a result that has this one in a folder.
+
+        `said`: sentences that are others there, since they name keys of its file.
+        """
         manifest, parts = self.manifest, list[PartRecord]()
         for part in manifest["parts"]:
             of_body = {form: BodyFile(**{**f, "path": f"{folder}/{f['path']}"}) for form, f in part["files"].items()}
             parts.append({**part, "name": f"{folder}: {part['name']}", "files": of_body})
         return Result(
             parts=parts,
-            findings=[FindingRecord(**{**f, "where": f"{folder}: {f['where']}"}) for f in manifest["mould_checks"]],
+            findings=[
+                FindingRecord(**{**f, "where": f"{folder}: {f['where']}", "advice": said.get(f["advice"], f["advice"])})
+                for f in manifest["mould_checks"]
+            ],
             meshes=[MeshFinding(**{**f, "path": f"{folder}/{f['path']}"}) for f in manifest["check"]["findings"]],
             own={f"{folder}/{path}": content for path, content in self.own.items()},
             shared={f"{folder}/{path}": sha256 for path, sha256 in self.shared.items()},
-            warnings=[f"{folder}: {line}" for line in manifest["warnings"]],
+            warnings=[f"{folder}: {said.get(line, line)}" for line in manifest["warnings"]],
             skipped=[
                 Skipped(output=f"{folder}/{each['output']}", reason=each["reason"])
                 for each in manifest["skipped"]

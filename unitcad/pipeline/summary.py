@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator
 from pathlib import Path
-from typing import Any
 
 from unitcad.casting.steps import casting_summary
 from unitcad.designs import widths
-from unitcad.designs.printed import OVER_ALL
 from unitcad.documents import read_json
 from unitcad.meshcheck.findings import counted
-from unitcad.moulds.heights import NEAR
+from unitcad.moulds.heights import as_printed
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.manifest import BENCH, PAGE, Manifest, PartRecord, row
 from unitcad.spec import Spec, assumed_lengths, length_text
 from unitcad.text import join_words, number
 
+MOULDED = {"moulds", "casting"}
+"""Outputs with which a person prints."""
 
-def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
+
+def unit_summary(moulds: MouldSet, folder: Path, manifest: Manifest) -> Iterator[str]:
     """Yield a line each: size, mass and checks; lengths to measure; what to print and mix; when it is ready; the level.
 
     The last line has the page to open. Skipped outputs have no line.
 
-    A length that is `given`, by its path, counts as measured.
+    A length that the set's spec was given counts as measured.
     """
+    spec = moulds.spec
     columns, checked = row(spec, manifest), checks_text(manifest)
     parts = [part for part in manifest["parts"] if part["role"] == "unit"]
     casting = read_json(folder / "casting.json") if manifest["casting"] else None
@@ -37,36 +40,18 @@ def unit_summary(spec: Spec, folder: Path, manifest: Manifest, given: Container[
         each = f"{cells} units, each " if cells > 1 else ""
         cast = [part["bbox_mm"] for part in parts if part["made"] != "bought"]  # without motor, circuit and wires
         across = " x ".join(number(width, 3) for width in widths(spec, cast))
-        made = as_printed(casting) if casting else ""
+        made = as_printed(moulds) if MOULDED & set(manifest["outputs"]) else ""
         if made and circuit:
             made += f", {high} with its circuit"
         yield f"{each}{across} mm across, {made or f'{high} mm high{circuit}'}{silicone}{checked}"
     elif checked:
         yield checked.removeprefix("; ")
-    yield from assumed_line(spec, given)
+    yield from assumed_line(spec, moulds.given)
     if casting:
         yield from casting_summary(casting, manifest["files"])
     if level := manifest["estimate"]:
         yield level["line"]
     yield from to_open(folder)
-
-
-def as_printed(casting: Mapping[str, Any]) -> str:
-    """Write the height over all and the caps as the printer makes them; "" if it makes them as drawn.
-
-    A curved array has no height over all.
-    """
-    heights = casting["unit_heights"]
-    total = next((each for each in heights if each["what"] == OVER_ALL), None)
-    caps = [each for each in heights if each["what"].endswith("'s cap")]
-    near, known = NEAR * casting["printing"]["layer_mm"], [*([total] if total else []), *caps]
-    if all(abs(each["printed_mm"] - each["asked_mm"]) <= near for each in known):
-        return ""
-    drawn, printed = ([number(each[key], 3) for each in known] for key in ("asked_mm", "printed_mm"))
-    named = f"cap{'s' * (len(caps) > 1)} {join_words(printed[-len(caps) :])}" if caps else ""
-    if total is None:
-        return f"{named} mm (drawn {join_words(drawn)})"
-    return f"{printed[0]} mm high (drawn {drawn[0]}){f', {named}' if named else ''}"
 
 
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:

@@ -59,7 +59,7 @@ class Unit(Subject):
         return Unit(with_formats(self.unit, tuple(formats)), self.given)
 
     def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
-        return unit_summary(self.unit, folder, manifest, self.given)
+        return unit_summary(self.moulds, folder, manifest)
 
     def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Result:
         spec, moulds, made = self.unit, self.moulds, Result()

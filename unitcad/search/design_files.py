@@ -16,6 +16,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.api.variant import Variant
+from unitcad.attenuation.edge.words import level_cell
 from unitcad.errors import UnitcadError
 from unitcad.pipeline import write as folders
 from unitcad.report.html_page import drawing, plain_page
@@ -228,13 +229,13 @@ def html_page(data: Mapping[str, Any], sections: Sequence[str]) -> str:
 
 
 def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
-    rows, head = [], ("unit", "measured", "probability", "80 % range", "g", "hours", "mm")
+    rows, head = [], ("unit", "level, % (80 % range)", "measured, %", "probability", "g", "hours", "mm")
     for one in proposals:
         edge, measured = one["edge"], one["measured"]
         cells = [
-            percent(measured["level"]) if measured else "",
+            level_cell(edge["level"], edge["low"], edge["high"]),
+            percent(measured["level"]).removesuffix(" %") if measured else "",
             f"{one['probability']:.2f}",
-            "" if edge["low"] is None else f"{percent(edge['low'])} to {percent(edge['high'])}",
             number(one["mass_g"], 2),
             number(one["cure_hours"], 3),
             f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",

@@ -15,17 +15,17 @@ from unitcad.designs import widths
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.heights import as_printed, height_warnings
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.report.page import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
-from unitcad.spec import Spec, convert, to_data, to_toml
+from unitcad.spec import Spec, to_data, to_toml
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
-from unitcad.spec.raw import RawSpec
 from unitcad.validation import from_data, warnings
-from unitcad.validation.defaults import resolve
+from unitcad.validation.defaults import resolved
 from unitcad.validation.load import all_faults, sound_data
 from unitcad.validation.load import judge as judge
 
@@ -52,7 +52,7 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return the result of `judge`. Raises UnitcadError also for a unit that has no moulds."""
 
-    spec = resolve(convert(data, RawSpec))
+    spec = resolved(data)
     _ = MouldSet(spec).plan
     return to_data(spec)
 
@@ -134,7 +134,14 @@ def _moulds(spec: Spec, answer: Answer) -> None:
         "moulds_apart": {name: list(offset) for name, offset in exploded_moves(moulds).items()},
     }
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
-    answer.lines = list(casting_summary(asdict(unit_procedure(moulds))))
+    answer.lines = [*printed_line(moulds), *casting_summary(asdict(unit_procedure(moulds)))]
+    answer.warnings = [*shallow_grooves(moulds), *height_warnings(moulds)]
+
+
+def printed_line(moulds: MouldSet, of: str = "The unit") -> Iterator[str]:
+    """Yield the heights that the printer makes, as a build's first line has them; nothing if they are as drawn."""
+    if made := as_printed(moulds):
+        yield f"{of} comes out {made}."
 
 
 def unit_procedure(moulds: MouldSet) -> Procedure:

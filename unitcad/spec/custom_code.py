@@ -17,7 +17,7 @@ from unitcad.files import read_text
 
 _FORM = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_][A-Za-z0-9_]*)", re.DOTALL)
 LARGEST = 1_000_000
-FILE_KEYS = (("design",), ("estimate", "fit"))
+FILE_KEYS = (("design",), ("body", "file"), ("estimate", "fit"))
 """Keys of a spec whose values name files."""
 BODIES = (".step", ".stp", ".stl", ".3mf")
 
@@ -55,7 +55,7 @@ def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     A relative path starts at `folder`. Such a file is the person's own: its code may run.
     Raises UnitcadError for a file that can't be read.
     """
-    data = _with_fit(data, folder)
+    data = _with_body(_with_fit(data, folder), folder)
     design = data.get("design")
     if not is_custom(design) or data.get("design_source") is not None:
         return data
@@ -73,6 +73,23 @@ def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     named = f"{path.name}:{name}"
     allow({_digest(named, source)})
     return {**data, "design": named, "design_source": source}
+
+
+def _with_body(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a spec's data with the text of the body that it names in `body.file_source`."""
+    table = data.get("body")
+    if not isinstance(table, dict) or not isinstance(table.get("file"), str) or table.get("file_source") is not None:
+        return data
+    if not is_body_file(table["file"]):
+        raise Refusal("body.file", table["file"], f"is no file of a body: its name ends in {', '.join(BODIES)}")
+    from unitcad.spec.body_file import body_text  # numpy and the mesh rules: most specs do without
+
+    path = folder / table["file"]
+    try:
+        text = body_text(table["file"], path)
+    except Refusal as refusal:
+        raise Refusal("body.file", refusal.value, refusal.limit, refusal.nearest) from None
+    return {**data, "body": {**table, "file": path.name, "file_source": text}}
 
 
 def _with_fit(data: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def plain_kinds(kind: Any) -> set[type]:
 
 def takes_none(kind: Any) -> bool:
     """Tell whether a resolved spec may lack a value of this kind."""
-    return type(None) in alternatives(kind)
+    return bool({type(None), msgspec.UnsetType} & set(alternatives(kind)))
 
 
 def entry_in(kind: Any, index: int = 0) -> Any:
@@ -118,7 +118,7 @@ def meaning(kind: Any) -> str:
 def default_of(field: msgspec.structs.FieldInfo) -> str:
     """Return a key's default as JSON; "" for none, an empty one or a table."""
     value = field.default if field.default is not msgspec.NODEFAULT else field.default_factory()
-    if value is None or isinstance(value, msgspec.Struct) or value in ((), {}, ""):
+    if value in (None, msgspec.UNSET) or isinstance(value, msgspec.Struct) or value in ((), {}, ""):
         return ""
     return json.dumps(value, default=list)
 
@@ -136,7 +136,7 @@ def values_of(kind: Any) -> str:
             words.append("text" if one is str else "true, false")
         elif origin in (tuple, list):
             words.append(f"list of {values_of(entry_in(one))}")
-        elif one is not type(None):
+        elif one not in (type(None), msgspec.UnsetType):
             words.append("table")
     return ", ".join(dict.fromkeys(words))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from msgspec import Meta, Struct
+from msgspec import UNSET, Meta, Struct, UnsetType
 
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
@@ -29,6 +29,7 @@ LEAST_LEDGE = 0.1
 Length = Annotated[float, between(0.1, kinds.LONGEST_MM)]
 Thickness = Annotated[float, between(LEAST_LAYER, kinds.LONGEST_MM)]
 CircuitThickness = Annotated[float, between(0.01, 5)]
+Coordinate = Annotated[float, between(-kinds.LONGEST_MM, kinds.LONGEST_MM)]
 Cavities = Annotated[int, Meta(ge=1)]
 Vents = Annotated[int, between(1, 1000)]
 TailWidth = Annotated[float, between(LEAST_TAIL, kinds.LONGEST_MM)]
@@ -78,6 +79,37 @@ class MotorTable(Table, frozen=True, kw_only=True):
     lip_mm: Annotated[float, between(0, 10, "reach of a lip of Layer 1 over the motor's edge at the skin; 0: none")] = (
         0.0
     )
+    at: Annotated[
+        tuple[Coordinate, Coordinate, Coordinate] | UnsetType,
+        Meta(
+            description="middle of the motor's lower face in the frame of the body's file, mm, for a spec with [body]; "
+            "default: the middle of its bottom, or of the floor"
+        ),
+    ] = UNSET
+
+
+class BodyTable(Table, frozen=True, kw_only=True):
+    """The unit's outer surface from a file: the layers are offset inwards from it.
+
+    Examples
+    --------
+    A spec's `[body]` takes the place of `design` and `diameter_mm`, and each layer has `thickness_mm` in place of
+    `wall_mm`.
+
+    >>> import unitcad
+    >>> unitcad.Body(file="tip.stl").bottom
+    'open'
+    """
+
+    file: Annotated[str, Meta(description="the body (.step, .stl, .3mf), standing on its lowest point")]
+    file_source: Annotated[str | None, Meta(description="text of the body; unitcad fills it in")] = None
+    bottom: Annotated[
+        Literal["open", "floor"],
+        Meta(
+            description="open: every layer reaches down to the skin; floor: layer 1 is a slab under the others, on "
+            "which motor and circuit are laid"
+        ),
+    ] = "open"
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
@@ -141,6 +173,13 @@ class LayerTable(Table, frozen=True, kw_only=True):
         Thickness | None,
         Meta(description="thickness of the layer above the motor, for a design that has caps"),
     ] = None
+    thickness_mm: Annotated[
+        Thickness | UnsetType,
+        Meta(
+            description="thickness of the layer in a spec with [body], in place of wall_mm; without it the innermost "
+            "layer fills the body"
+        ),
+    ] = UNSET
 
 
 class MouldsTable(Table, frozen=True, kw_only=True):
@@ -297,6 +336,9 @@ class RawSpec(Table, frozen=True, kw_only=True):
         str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
     ]
     diameter_mm: Annotated[float, between(1, kinds.LONGEST_MM, "diameter of the unit")]
+    body: Annotated[
+        BodyTable | UnsetType, Meta(description="the outer surface from a file, in place of design and diameter_mm")
+    ] = UNSET
     skin_mm: Annotated[
         float,
         between(0, 20, "thickness of a film of the last layer's silicone over the skin side; 0: none"),

@@ -19,6 +19,7 @@ from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEnt
 from unitcad.errors import UnitcadError
 from unitcad.spec.raw import (
     DERIVED,
+    BodyTable,
     CastingTable,
     EstimateTable,
     Format,
@@ -83,6 +84,8 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
         A design (``unitcad list designs``), "FILE.py:NAME", or a file of bodies.
     diameter_mm : float
         Diameter of the unit, mm.
+    body : Body or dict, optional
+        The outer surface from a file, in place of design and diameter.
     skin_mm : float, optional
         Thickness of the film that closes the skin side, mm. Default: 0, no film.
     layers : sequence of Layer or dict
@@ -126,9 +129,10 @@ class Spec(RawSpec, frozen=True, kw_only=True, metaclass=_Validated):
             self,
             *,
             name: str,
-            design: str,
-            diameter_mm: float,
+            design: str = ...,
+            diameter_mm: float = ...,
             layers: Sequence[LayerTable | _Keys],
+            body: BodyTable | _Keys = ...,
             skin_mm: float = 0.0,
             motor: MotorTable | _Keys | bool = ...,
             fpcb: FpcbTable | _Keys | bool | None = None,

@@ -23,6 +23,13 @@ def to_data(spec: Spec) -> dict[str, Any]:
             del layer["cap_mm"]
     if spec.motor.absent:
         data["motor"] = False
+    if spec.body:  # they follow from the body
+        for table, keys in (
+            (data, ("design", "diameter_mm")),
+            *((one, ("wall_mm", "cap_mm")) for one in data["layers"]),
+        ):
+            for key in keys:
+                table.pop(key, None)
     return data
 
 

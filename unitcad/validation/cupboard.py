@@ -91,17 +91,19 @@ def _read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Cupboard]:
 def held(path: str | os.PathLike[str]) -> dict[str, dict[str, Any]]:
     """Return the silicones, motors and printers that a cupboard holds, by kind and name, its own entries among them.
 
-    A kind that its table `at_hand` does not narrow is the whole catalogue. Raises as `read_cupboard`.
+    A kind that its table `at_hand` does not name is the whole catalogue; of printers, own entries are all he has.
+    Raises as `read_cupboard`.
     """
     data, cupboard = _read(path)
     given, at_hand = data.get("at_hand", {}), cupboard.at_hand
-    named = {"materials": at_hand.materials, "motors": at_hand.motors, "printers": (at_hand.printer,)}
-    keys = {"materials": "materials", "motors": "motors", "printers": "printer"}
+    printers = (at_hand.printer,) if "printer" in given else tuple(cupboard.printers)
+    named = {"materials": at_hand.materials, "motors": at_hand.motors, "printers": printers}
+    narrowed = {"materials": "materials" in given, "motors": "motors" in given, "printers": bool(printers)}
     found = dict[str, dict[str, Any]]()
     for kind, names in named.items():
         own = getattr(cupboard, kind)
         known: dict[str, Any] = getattr(catalogue, kind)(own)
-        kept = {*(names or known), *own} if keys[kind] in given else {*known}
+        kept = {*(names or known), *own} if narrowed[kind] else {*known}
         found[kind] = {name: entry for name, entry in known.items() if name in kept}
     return found
 

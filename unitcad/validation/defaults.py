@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from msgspec import structs
+from msgspec import UNSET, structs
 
 from unitcad import catalogue
 from unitcad.catalogue.entries import Drive
@@ -20,7 +21,17 @@ from unitcad.rooms import kind_of
 from unitcad.spec import MOTOR_SIZES, Spec, convert, motor_of
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.layers import Layers
-from unitcad.spec.raw import DEFAULT_MOTOR, EstimateTable, FpcbTable, MouldsTable, RawSpec, WiresTable
+from unitcad.spec.raw import (
+    DEFAULT_MOTOR,
+    LEAST_LAYER,
+    BodyTable,
+    EstimateTable,
+    FpcbTable,
+    MotorTable,
+    MouldsTable,
+    RawSpec,
+    WiresTable,
+)
 from unitcad.spec.resolved import CastLayer, MotorSize
 from unitcad.text import number, with_article
 
@@ -39,9 +50,56 @@ _BASE = {"plinth_height_mm": 2.0, "plate_mm": 4.0}
 _PRINTER_LENGTHS = tuple(f for f in MouldsTable.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
 
 
+def resolved(data: Mapping[str, Any]) -> Spec:
+    """Return the resolved spec of plain data. Raises Refusal for the first value that is not valid."""
+    return resolve(convert(_with_sizes(data), RawSpec))
+
+
+_OF_BODY = ("design", "design_source", "diameter_mm", "skin_mm", "parameters")
+"""Keys that a spec with [body] has no use for."""
+
+
+def _with_sizes(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return data with the sizes that follow from a [body]: design, diameter, and each layer's wall."""
+    body, layers = data.get("body"), data.get("layers")
+    if not isinstance(body, Mapping):
+        return data
+    for key in _OF_BODY:
+        if data.get(key):
+            raise Refusal(key, data[key], "a spec with [body] takes it from the body: leave it out")
+    if not isinstance(body.get("file"), str):
+        convert(body, BodyTable, "body")
+    if not isinstance(body.get("file_source"), str):
+        raise Refusal("body.file_source", None, "is required beside file")
+    from unitcad.designs.offset.layers import size_of  # numpy and manifold3d: most specs do without
+
+    across = size_of(convert(body, BodyTable, "body"))[:2]
+    sized = {**data, "design": body["file"], "diameter_mm": max(across)}
+    if isinstance(layers, list | tuple) and all(isinstance(layer, Mapping) for layer in layers):
+        sized["layers"] = [_walled(layers, i, min(across)) for i in range(len(layers))]
+    return sized
+
+
+def _walled(layers: Sequence[Mapping[str, Any]], i: int, across: float) -> dict[str, Any]:
+    """Return a layer of a body with its thickness as wall and cap; one without fills the inside."""
+    for key in ("wall_mm", "cap_mm"):
+        if layers[i].get(key) is not None:
+            limit = "a layer of a [body] has thickness_mm in its place; without it the innermost layer fills the body"
+            raise Refusal(f"layers.{i}.{key}", layers[i][key], limit)
+    thick = layers[i].get("thickness_mm")
+    if not isinstance(thick, int | float):
+        others = [each.get("thickness_mm") for each in layers]
+        taken = sum(float(each) for each in others if isinstance(each, int | float))
+        thick = max(round(across / 2 - taken, 3), LEAST_LAYER)
+    return {**layers[i], "wall_mm": thick, "cap_mm": thick}
+
+
 def resolve(raw: RawSpec) -> Spec:
     """Return the resolved spec. Raises Refusal for the first value that is not valid."""
-    if is_custom(raw.design):
+    _check_body_keys(raw)
+    if raw.body:
+        pass
+    elif is_custom(raw.design):
         if raw.design_source is None:
             raise Refusal("design_source", None, f"is required with design = {raw.design!r}")
         if is_body_file(raw.design) and raw.parameters:
@@ -61,6 +119,27 @@ def resolve(raw: RawSpec) -> Spec:
     design.limits(spec, design.dimensions(spec))
     check_ribs(spec)
     return spec
+
+
+def _check_body_keys(raw: RawSpec) -> None:
+    """Raise Refusal for a key of layers by offset in a spec without [body], and for a layer without thickness there."""
+    if not raw.body:
+        at = raw.motor.at if isinstance(raw.motor, MotorTable) else UNSET
+        found = [
+            ("motor.at", at),
+            *((f"layers.{i}.thickness_mm", one.thickness_mm) for i, one in enumerate(raw.layers)),
+        ]
+        for field, value in found:
+            if value is not UNSET:
+                given = list(value) if isinstance(value, tuple) else value
+                raise Refusal(field, given, "is for a spec with [body], whose layers are offset from a file")
+        return
+    inmost = 1 if raw.body.bottom == "floor" else 0
+    for i, layer in enumerate(raw.layers):
+        if layer.thickness_mm is UNSET and i != inmost:
+            limit = "is required: only the innermost layer by offset does without, and fills the body"
+            limit = 'is required with bottom = "floor": that of the floor' if inmost > i else limit
+            raise Refusal(f"layers.{i}.thickness_mm", None, limit)
 
 
 def check_fit(table: EstimateTable) -> None:
@@ -126,7 +205,12 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
             "fpcb": fpcb,
             "wires": wires,
             "layers": tuple(
-                CastLayer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0)
+                CastLayer(
+                    material=layer.material,
+                    wall_mm=layer.wall_mm,
+                    cap_mm=layer.cap_mm or 0.0,
+                    thickness_mm=layer.thickness_mm,
+                )
                 for layer in raw.layers
             ),
             "moulds": moulds,
@@ -324,8 +408,10 @@ def _bonds(spec: Spec) -> list[str]:
 
 
 def _leads(spec: Spec) -> list[str]:
-    drawn = is_body_file(spec.design)
-    if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn):
+    drawn = is_body_file(spec.design) and not spec.body
+    if spec.body and spec.layers[0].thickness_mm is not UNSET and spec.body.bottom == "open":
+        return []  # by the mouth of the hollow
+    if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn or spec.body):
         return []
     offer = "draw a notch for them" if drawn else "add a table [wires] with diameter_mm, or [fpcb]"
     return [f"no way out for the motor's leads: they run between unit and skin; {offer}"]

@@ -16,10 +16,9 @@ from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unk
 from unitcad.files import read_text
 from unitcad.rooms import FileKind, expect_none_but, file_kinds, of_other_kind
 from unitcad.rooms import load as load_reference
-from unitcad.spec import Spec, check_plain, convert, to_data
+from unitcad.spec import Spec, check_plain, to_data
 from unitcad.spec.custom_code import is_body_file, is_custom, with_source
-from unitcad.spec.raw import RawSpec
-from unitcad.validation.defaults import resolve
+from unitcad.validation.defaults import resolved
 from unitcad.validation.plain_data import ABSENT, Changes, Source, apply, at, changes_of, plain, requested_data
 from unitcad.validation.suggestions import every_fault, suggest
 
@@ -215,7 +214,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     whole = with_source(data, Path())
 
     def settled(data: dict[str, Any]) -> Spec:
-        spec = resolve(convert(data, RawSpec))
+        spec = resolved(data)
         if makeable:
             makeable(spec)
         return spec
@@ -262,7 +261,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     """
     plain = with_source(dict(data), folder) if folder else dict(data)
     try:
-        return resolve(convert(plain, RawSpec))
+        return resolved(plain)
     except UnknownKey:
         raise
     except Refusal as refusal:
@@ -271,7 +270,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
 
 def judge(data: dict[str, Any]) -> dict[str, Any]:
     """Return a spec's plain data, everything settled. Raises Refusal."""
-    return to_data(resolve(convert(data, RawSpec)))
+    return to_data(resolved(data))
 
 
 def sound_data(data: Mapping[str, Any]) -> dict[str, Any]:

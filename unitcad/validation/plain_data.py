@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, Protocol, cast
 
-from msgspec import Struct
+from msgspec import UNSET, Struct
 
 from unitcad.arguments import confirm_form
 from unitcad.documents import DEEPEST, expect_bounded, parse_value
@@ -170,7 +170,7 @@ def _plain(node: object, field: str) -> Any:
         named = {name: getattr(node, name) for name in node.__struct_fields__}
         if isinstance(node, CastLayer) and not node.cap_mm:  # an open ring, whose cap a file leaves out
             del named["cap_mm"]
-        return _plain({key: value for key, value in named.items() if value is not None}, field)
+        return _plain({key: value for key, value in named.items() if value not in (None, UNSET)}, field)
     if isinstance(node, Mapping):
         table = cast("Mapping[object, object]", node)
         return {str(key): _plain(value, f"{field}.{key}".lstrip(".")) for key, value in table.items()}

@@ -13,7 +13,7 @@ from msgspec.structs import FieldInfo
 from unitcad.documents import read_toml
 from unitcad.spec.fields import entry_in, fields_of, is_value, meaning, table_in
 
-_NOT_OFFERED = ("design_source", "fit_source")
+_NOT_OFFERED = ("design_source", "file_source", "fit_source")
 _ABOUT_TABLES = (
     "# The tables below show the defaults; ... stands for a value from the catalogue.",
     "# To change a value, remove the # from its line and from its table's header.",

@@ -31,6 +31,7 @@ from unitcad.attenuation.edge.models import BASELINE, stored
 from unitcad.attenuation.edge.ranges import LabFit, Lead, lead_of, own_block
 from unitcad.attenuation.edge.scores import scores
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.text import number
 
 PAPER = "the paper"
 """Who measured the catalogue's levels."""
@@ -167,10 +168,14 @@ def leave_one_out_error(model: str, variant: EstimateInput, fit: LabFit | None =
 
 
 def _wider(lead: Lead, variant: EstimateInput) -> list[str]:
-    """Return the inputs that widen the range by more than a little, the strongest first."""
+    """Return the inputs that widen the range by more than a little, the strongest first; none if it prints the same."""
     units, of = stack_inputs([variant]), lengths([variant])
-    whole = float(lead.predictive(units, of).scale[0])
+    found = lead.predictive(units, of)
+    whole, (low, level, high) = float(found.scale[0]), (float(end[0]) for end in found.range)
     added = {name: float(one[0]) for name, one in lead.unmeasured(units, of).items()}
+    share = math.sqrt(max(1.0 - sum(added.values()) / whole**2, 0.0)) if whole else 1.0
+    if all(number(level * (end / level) ** share, 2) == number(end, 2) for end in (low, high)):
+        return []
     felt = [name for name, more in added.items() if whole - np.sqrt(max(whole**2 - more, 0.0)) > _NOTICED * whole]
     of_nobody = "silicones (the key like names the one of the catalogue, if it is one)"
     words = {"silicones": of_nobody} if any(layer.other for layer in variant.layers) else {}

@@ -15,9 +15,16 @@ from unitcad.text import join_words, number
 
 LEAST = 1e-4
 """Levels below it are not printed as numbers."""
-ANY_FORM = "a factor of about 1.3 to 1.4, whatever the form"
+ANY_FORM = "a factor of about 1.3 to 1.4, whatever the form of the rule"
 """Leave-one-out error of the rules and class means that were tried on the nine units."""
 NO_EFFECT = "within the range: no effect shown"
+ALIKE = ", all units alike"
+"""After the name of the leading model: without the share of the measured units' own errors that the answer has."""
+BRACKETS = (
+    "The answer is the leading model with a share of the own errors of measured units near this one; "
+    "'all units alike' is without it. In brackets: of the answer its 80 % range, of a model the ends of its inputs' "
+    "ranges."
+)
 NOT_COMPARED = "not compared: a level is not known"
 SURFACE = (
     "The paper does not state on which surface or along which axis it measured. The rule is fitted to its levels as "
@@ -124,10 +131,15 @@ def comparison(named: Sequence[tuple[str, Answer]]) -> list[dict[str, str]]:
 
 def cell(one: Answer) -> str:
     """Return level and range for a table, without the unit."""
-    if one.low is None or one.high is None:
+    return level_cell(one.level, one.low, one.high)
+
+
+def level_cell(level: float | None, low: float | None, high: float | None) -> str:
+    """Return a level and the ends of its range for a table, in per cent, without the unit."""
+    if low is None or high is None:
         return "not known"
-    ends = spread(one.low, one.high).removesuffix(" %")
-    return ends if one.level is None else f"{percent(one.level).removesuffix(' %')} ({ends})"
+    ends = spread(low, high).removesuffix(" %")
+    return ends if level is None else f"{percent(level).removesuffix(' %')} ({ends})"
 
 
 def percent(level: float) -> str:

@@ -58,8 +58,8 @@ class Nearest:
         for beside in (before[asked], after[asked]):
             there = (beside >= 0) & (beside < len(order))
             which = order[asked[there]]
-            squares = _squares(points[:, which - n], self.corners[:, :, order[beside[there]]])
-            found[which] = np.minimum(found[which], squares)
+            here = squares(points[:, which - n], self.corners[:, :, order[beside[there]]])
+            found[which] = np.minimum(found[which], here)
         return found[n:]
 
     def _search(self, points: Floats, found: Floats) -> None:
@@ -74,7 +74,7 @@ class Nearest:
             keep = np.flatnonzero(np.einsum("ij,ij->j", away, away) < found[of])
             of, node = of[keep], node[keep]
         of, face = _below(of, node, self.corners.shape[2])
-        np.minimum.at(found, of, _squares(points.take(of, axis=1), self.corners.take(face, axis=2)))
+        np.minimum.at(found, of, squares(points.take(of, axis=1), self.corners.take(face, axis=2)))
 
 
 def _below(of: Ints, node: Ints, there: int) -> tuple[Ints, Ints]:
@@ -98,7 +98,7 @@ def nearest_of(corners: Floats) -> Nearest:
     return Nearest(columns, middles[order], levels[::-1])
 
 
-def _squares(points: Floats, faces: Floats) -> Floats:
+def squares(points: Floats, faces: Floats) -> Floats:
     """Return the squares of the distances of points (3, n) to triangles (3, 3, n): to the inside, or else to a side."""
     a, b, c = faces
     normal = _cross(b - a, c - a)

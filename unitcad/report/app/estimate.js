@@ -70,8 +70,8 @@
   const ownMarks = (data) => (data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: percent(own.value) }));
 
   function levels(data) {
-    const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
     const { level, low, high, source } = data.answer || {};
+    const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: `${nameOf(model)}${source && model === source.model ? ", all units alike" : ""}`, entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
     if (known(low)) rows.unshift({ name: `Level, 80 % range by ${source.model}`, entry: percents({ value: level, low, high }), colour: "series-6" });
     const found = data.measured || {};
     const measured = found.same_size ? found : {};
@@ -79,7 +79,7 @@
     const fit = data.fit;
     const reasons = [...new Set(rows.map(({ reason }) => reason).filter(Boolean))];
     return [
-      rangeChart(rows, marks, "Level at the unit's edge, % of the motor's amplitude; a model's bar is the spread from the inputs' ranges, not its error."),
+      rangeChart(rows, marks, "Level at the unit's edge, % of the motor's amplitude; a model's bar is the spread from the inputs' ranges, not its error. The level has a share of the own errors of measured units near this one; 'all units alike' is without it."),
       reasons.map((reason) => el("p", { className: "note" }, reason)),
       fit && predicted(data, fit),
       known(found.level) ? el("p", { className: "note" }, found.same_size ? "" : `${number(percent(found.level), 3)} %: `, found.note) : el("p", { className: "note" }, "The paper measured no such unit."),

@@ -282,8 +282,11 @@
       const crosstalk = estimate.of === state.unit.text && estimate.drawings && `${estimate.lines[0]} `;
       const change = answer && state.level && state.level.of !== estimate.of && U.compared(answer, state.level.answer);
       const level = crosstalk || answer && `${answer.line} ${change ? `Level against before: ${change}. ` : ""}`;
-      const lines = moulds.of === state.unit.text && moulds.model ? moulds.lines || [] : [];
-      clear(glance, level, lines.slice(0, 1).map((line) => line[0].toUpperCase() + line.slice(1)));
+      const made = moulds.of === state.unit.text && moulds.model ? moulds : {};
+      const lines = made.lines || [];
+      const printed = lines.slice(0, lines.findIndex((line) => line.startsWith("print ")) + 1);
+      const warned = (made.warnings || []).map((line) => `Warning: ${line}.`);
+      clear(glance, level, [...printed.map((line) => line[0].toUpperCase() + line.slice(1)), ...warned].join(" "));
       glance.dataset.old = "false";
     }
 
@@ -328,7 +331,7 @@
     async function showMoulds(answer) {
       const faults = answer.faults || [];
       const failed = (answer.checks || []).filter((check) => !check.ok);
-      const manifest = { mould_checks: answer.checks || [], warnings: state.unit.warnings || [] };
+      const manifest = { mould_checks: answer.checks || [], warnings: [...(state.unit.warnings || []), ...(answer.warnings || [])] };
       if (answer.checks) {
         const list = U.parts.checks({ manifest });
         clear(judged, (answer.lines || []).map((line) => el("p", {}, line)), [...list.childNodes].slice(1));
@@ -350,7 +353,11 @@
         reveal();
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
-      } else said(failed.length ? "bad" : "good", `checks: ${manifest.mould_checks.length - failed.length} of ${manifest.mould_checks.length}`);
+      } else {
+        const { length } = manifest.warnings;
+        const warned = length ? `, ${length} warning${length > 1 ? "s" : ""}` : "";
+        said(failed.length ? "bad" : length ? "" : "good", `checks: ${manifest.mould_checks.length - failed.length} of ${manifest.mould_checks.length}${warned}`);
+      }
     }
 
     function toForm() { page.querySelector("#spec").focus({ preventScroll: true }); }
