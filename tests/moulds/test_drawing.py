@@ -1,6 +1,7 @@
 """The dimensioned drawing: its lengths are the meshes', no number is on a line, its scales are ISO's, its bytes stay."""
 
 import base64
+import math
 import re
 import sys
 import zlib
@@ -17,7 +18,7 @@ from unitcad.kernels.mesh import bounds, realise
 from unitcad.pipeline import workshop
 from unitcad.pipeline.unit import Unit
 from unitcad.pipeline.write import build
-from unitcad.shape import box, cut, cylinder
+from unitcad.shape import box, cut, cylinder, moved
 from unitcad.spec import spec_hash
 from unitcad.validation import load
 
@@ -185,15 +186,23 @@ def test_only_faces_alike_on_both_sides_are_a_width():
         ("20", "outside width"),
     ]
     assert [(one.text, one.name) for one in lengths.heights(loops, loops)] == [
-        ("0", ""), ("4", ""), ("6", "height of the edge"), ("8", "height"),
+        ("0", ""), ("4", "depth from below"), ("6", "height of the edge"), ("8", "height"),
     ]  # fmt: skip
     assert [one.text for one in lengths.across(loops, 0.0, lambda half, *_: half == 3)] == ["Ø6", "20"]
 
 
-def test_circles_and_slots_are_found_and_letters_are_not():
-    plate = cut(box(-20, 20, -10, 10, 0, 3), [cylinder(3, -1, 4), box(-15, -11, -4, 4, -1, 4)])
+def test_circles_and_slots_are_found_and_letters_and_rings_of_holes_are_not():
+    ring = [moved(cylinder(1, -1, 4), 6 * math.cos(i * math.tau / 8), 6 * math.sin(i * math.tau / 8)) for i in range(8)]
+    end = [moved(cylinder(2, -1, 4), 15, y) for y in (-3, 3)]
+    letter = box(-15, -11, -4, 4, 2, 4), box(-11, -9, -4, -2, 2, 4)
+    plate = cut(box(-20, 20, -10, 10, 0, 3), [cylinder(3, -1, 4), *ring, *end, box(13, 17, -3, 3, -1, 4), *letter])
     slices = lengths.Slices(realise(plate, 64, 1.0))
-    assert slices.diameters(0.0, 0.0) == pytest.approx((6.0,), abs=0.002)
+    diameters = slices.diameters(0.0, 0.0)
+    assert diameters == pytest.approx((6.0,), abs=0.002)
     assert slices.diameters(0.0, 0.0, 2.5) == ()
     assert slices.diameters(1.0, 0.0) == ()
-    assert not slices.others([])[1:]
+    others = slices.others([lengths.Hole("", 0.0, 0.0, "Ø6", diameters)])
+    assert [one.name for one in others] == [*(f"P{i}" for i in range(1, 9)), "S1"]
+    assert [one.size for one in others] == [*["Ø2"] * 8, "4 x 10"]
+    assert (others[0].x, others[0].y) == pytest.approx((0.0, 6.0), abs=0.005)
+    assert (others[-1].x, others[-1].y) == pytest.approx((15.0, 0.0), abs=0.005)

@@ -67,6 +67,8 @@ COMMANDS = {
     f"layers.1.material; layers.0.material = 'Ecoflex': unknown name; closest: {ECOFLEX}",
     "build unit.toml --set layers.0.material=Ecoflex": "layers.0.material = 'Ecoflex': unknown name; closest: "
     f"{ECOFLEX}; nearest accepted: '{ECOFLEX.partition(',')[0]}'",
+    "build unit.toml --set printer.first_layer_mm=0.3": "printer.first_layer_mm = 0.3: unknown key; known: "
+    "moulds.first_layer_mm; nearest accepted: 'moulds.first_layer_mm'",
     "build unit.toml --set frequency=200Hz": "frequency = '200Hz': unknown key; known: estimate.frequency_hz; "
     "estimate.frequency_hz = 200; nearest accepted: 'estimate.frequency_hz'",
     "build unit.toml --set temperature=20": "temperature = 20: unknown key; known: casting.room_c; "

@@ -44,7 +44,7 @@ RESIN_LAYER_S = 10.0
 """Time of a resin printer for a layer, s (assumed)."""
 MOST_ERROR_PCT = 5.0
 """Error of the ratio by the scale at which a cure begins to suffer (assumed)."""
-CASTING_NEEDS = "mix_ratio", "cure_h", "elongation_pct"
+CASTING_NEEDS = {"mix_ratio": "mix ratio", "cure_h": "cure time", "elongation_pct": "elongation at break"}
 """Values of a silicone without which there is no casting: grams, times, and the strain at which it tears."""
 DATASHEET_C = 23.0
 DOUBLING_K = 10.0

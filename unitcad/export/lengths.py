@@ -20,8 +20,12 @@ LEAST_EDGE_MM = 0.45
 """A face that is shorter than this in the section gets no dimension."""
 LEAST_SIDE_MM = 1.5
 """A side of an outline from above that is shorter than this gets no dimension: a facet of a circle is."""
+LEAST_HOLE_MM = 0.7
+"""A hole is listed from this diameter."""
 LEAST_BORE_MM = 4.0
 """The jaws of a caliper go into a hole of this diameter."""
+LEAST_ROD_MM = 3.0
+"""A depth rod reaches a face of this width."""
 TAPER = 0.15
 """Slope of a face that still counts as upright."""
 SAME_MM = 0.02
@@ -194,7 +198,7 @@ def windows(loops: Sequence[Loop], width_at: Callable[[float, float], float | No
 def heights(loops: Sequence[Loop], outline: Sequence[Loop]) -> list[Length]:
     """Return the heights of the level faces of a section, and of the outline behind it, above the lowest one.
 
-    Jaws reach the top of the outline, and of each end of the section.
+    Jaws reach the top of the outline, and of each end of the section; a depth rod a wide face that is open from below.
     """
     long: defaultdict[float, float] = defaultdict(float)
     feet: dict[float, Point] = {}
@@ -215,9 +219,18 @@ def heights(loops: Sequence[Loop], outline: Sequence[Loop]) -> list[Length]:
 
     def name(z: float) -> str:
         at_edge = min(abs(z - edge) for edge in edges) < SAME_MM
-        return "height" if z == high else "height of the edge" if at_edge and z > low else ""
+        if z > low and (z == high or at_edge):
+            return "height" if z == high else "height of the edge"
+        return "depth from below" if any(_open_below(a, b, loops) for a, b in _sides(loops) if a[1] == z > low) else ""
 
     return [Length(coord(z - low, 2), found[0], (x, z), "left", name(z), running=True) for x, z in found]
+
+
+def _open_below(a: Point, b: Point, loops: Sequence[Loop]) -> bool:
+    """Return whether a side is a level face with its material above, wide, and with nothing under its middle."""
+    x, z = (a[0] + b[0]) / 2, a[1]
+    under = any(min(c[0], d[0]) <= x <= max(c[0], d[0]) and min(c[1], d[1]) < z - SAME_MM for c, d in _sides(loops))
+    return abs(b[1] - z) < SAME_MM / 4 and b[0] - a[0] >= LEAST_ROD_MM and not under
 
 
 class Slices:
@@ -235,15 +248,19 @@ class Slices:
         """Return the diameters of the circles about a point that are nearly whole, mm, ascending; radii up to `reach`."""
         found = list[float]()
         for _, loops in self.loops:
-            points = np.vstack(loops) - (x, y)
-            radii = np.hypot(*points.T)
-            points, radii = points[radii < reach], radii[radii < reach]
+            starts = np.vstack(loops) - (x, y)
+            ends = np.vstack([np.roll(loop, -1, axis=0) for loop in loops]) - (x, y)
+            # Both ends of a side are on the circle: holes in a ring have corners there, and few sides.
+            radii, far = np.hypot(*starts.T), np.hypot(*ends.T)
+            side = (abs(radii - far) < ROUND_MM) & (radii < reach)
+            starts, ends, radii = starts[side], ends[side], radii[side]
+            turns = np.arctan2(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0], (starts * ends).sum(axis=1))
             # Corners are on the circle and others of its polygon inside it: the largest first.
             for radius in np.unique(radii.round(3))[::-1].tolist():
                 near = abs(radii - radius) < ROUND_MM
-                if radius < 0.3 or np.count_nonzero(near) < LEAST_CORNERS:
+                if radius < 0.3 or abs(turns[near]).sum() < math.pi:
                     continue
-                if all(abs(2 * radius - d) > 2 * ROUND_MM for d in found) and on_circle(points[near], radius):
+                if all(abs(2 * radius - d) > 2 * ROUND_MM for d in found) and on_circle(starts[near], radius):
                     found.append(2 * radius)
         return tuple(sorted(found))
 
@@ -254,7 +271,7 @@ class Slices:
             for loop in loops:
                 (x0, y0), (x1, y1) = loop.min(axis=0), loop.max(axis=0)
                 x, y, wide, deep = (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0
-                within = min(wide, deep) > 1.5 and max(wide, deep) < (self.x1 - self.x0) / 2
+                within = min(wide, deep) > LEAST_HOLE_MM and max(wide, deep) < (self.x1 - self.x0) / 2
                 near = any(math.hypot(x - one.x, y - one.y) < max(one.diameters, default=8) / 2 for one in taken)
                 if not within or near:
                     continue
@@ -268,7 +285,7 @@ class Slices:
                 else:
                     short, long = sorted((float(wide), float(deep)))
                     rounded = short * (long - short) + math.pi / 4 * short**2
-                    if long > 1.5 * short and abs(area - rounded) < 0.02 * area:
+                    if short > LEAST_SIDE_MM and long > 1.5 * short and abs(area - rounded) < 0.02 * area:
                         slots[at] = f"{coord(wide, 2)} x {coord(deep, 2)}"
         found = [
             Hole(f"P{i}", *at, f"Ø{coord(wide, 2)}", (wide,)) for i, (at, wide) in enumerate(_rows(pins.items()), 1)

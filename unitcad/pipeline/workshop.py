@@ -127,11 +127,13 @@ def tool(moulds: MouldSet, body: Body, places: Sequence[Place]) -> Sheet:
     known.pop((round(x0, 2), round(x1, 2)), None)  # from above
     shown = list(known.values())[::-1]
     plan = plan_of(solid, [x for _, x, _ in inside if len(inside) == 1])
+    levels = lengths.heights(loops, behind)
     ordered = [
         *plan.lengths[:2],
-        *(levels := lengths.heights(loops, behind)),
+        *(one for one in levels if "depth" not in one.name),
         *sorted(shown, key=lambda one: (not _works(one, holes), one.name == "", -one.value)),
         *plan.lengths[2:],
+        *(one for one in levels if "depth" in one.name),
     ]
     if sum(bool(one.name) for one in ordered) < 5:
         more = [replace(one, side="left") for one in lengths.between_faces(loops) if one.side == "left"]
@@ -149,7 +151,7 @@ def tool(moulds: MouldSet, body: Body, places: Sequence[Place]) -> Sheet:
         return tuple(replace(one, check=checks.get(one, 0)) for one in found)
 
     front = (*checked(levels), *checked(shown), *lengths.windows(loops, lambda x, z: _window(solid, cut, x, z)))
-    table = [*holes, *slices.others(holes)] if len(inside) > 1 else []
+    table = [*(holes if len(inside) > 1 else ()), *slices.others(holes)]
     section = Region("", body.colour, tuple(tuple(loop) for loop in loops))
     axes = tuple(row) if holes else ()
     return Sheet(

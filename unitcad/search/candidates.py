@@ -19,7 +19,7 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.measured import FIELDS, stack_inputs
 from unitcad.attenuation.edge.ranges import Predictive, lead_of
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
-from unitcad.casting.figures import cure_hours, not_castable
+from unitcad.casting.figures import CASTING_NEEDS, cure_hours, not_castable
 from unitcad.casting.procedure import procedure
 from unitcad.designs import dimensions
 from unitcad.designs import shipped as designs
@@ -232,7 +232,8 @@ def silicones_of(target: Target, frequency: Quantity) -> tuple[dict[str, Silicon
     entries, known, skipped = catalogue.materials(target.asked.materials), {}, {}
     for name in target.materials:
         if lacks := not_castable(entries[name]):
-            skipped[name] = f"it can't be cast: no source gives its {join_words(lacks)}"
+            missing = " and ".join(CASTING_NEEDS[key] for key in lacks)
+            skipped[name] = f"the catalogue has no {missing} for it (state {' and '.join(lacks)} in [materials])"
             continue
         layer = silicone_layer(entries[name], 1e-3, frequency, target.asked.estimate.moduli == "quasi-static")
         if math.isnan(layer.place):

@@ -69,11 +69,14 @@ def _by_meaning(refusal: UnknownKey, data: Mapping[str, Any], kind: Any) -> Unkn
     """Return the refusal of a key with the paths that it may mean, if a path of the file means more than its spelling.
 
     An exact key of another table comes before one of like spelling in its own, a word of a description after it. The
-    spelling of a key with an entry's number in brackets says nothing.
+    spelling of a key with an entry's number in brackets says nothing. `printer.layer_mm` is moulds.layer_mm.
     """
     path, value = lone_path(refusal.field, refusal.value)
     spelt = refusal.nearest is not None and "[" not in refusal.field
     close = None if refusal.settled else meant(path, value, kind, data, least=EXACT if spelt else 1)
+    if not close and path != refusal.field:  # a key of another table, below a name that is no table
+        found = meant(path.rpartition(".")[2], value, kind, data, least=EXACT)
+        close = found if len(found) == 1 else None
     if not close:
         return refusal
     if close == [refusal.nearest]:
