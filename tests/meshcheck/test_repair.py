@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from unitcad.cli.command_line import app
 from unitcad.errors import Refusal
-from unitcad.meshcheck.repair import repair
 from unitcad.meshcheck.rules.inspection import Options
+from unitcad.pipeline.repair import repair
 
 
 def cracked(folder, by):

@@ -41,7 +41,7 @@ def _repair(names: list[str], target: str) -> None:
     """Write a closed copy of a file, and say how far it is from the file. Raises Refusal."""
     if len(names) != 1 or not Path(names[0]).is_file():
         raise Refusal("--repair", target, "takes one mesh file: unitcad check FILE --repair OUT.stl")
-    from unitcad.meshcheck.repair import repair  # loads manifold3d
+    from unitcad.pipeline.repair import repair  # loads manifold3d
 
     far = repair(Path(names[0]), Path(target), Options())
     sys.stdout.write(f"{target}: closed copy of {names[0]}, at most {far:.3g} mm off its surface\n")

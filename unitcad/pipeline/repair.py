@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from manifold3d import Error, Manifold, Mesh64
 from scipy.spatial import cKDTree
 
 from unitcad import files
@@ -58,8 +59,6 @@ def joined(corners: Floats) -> tuple[Floats, float] | None:
 
     None if they don't meet.
     """
-    from manifold3d import Error, Manifold, Mesh64
-
     vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     faces = faces.reshape(-1, 3)
     size = float(np.ptp(vertices, axis=0).max())
