@@ -122,16 +122,15 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     procedure = json.loads((folder / "casting.json").read_text())
     manifest = json.loads((folder / "manifest.json").read_text())
     assert lines[0].startswith("14 mm across")
-    assert lines[1].startswith(
-        "measure first; assumed: motor.thickness_mm = 2 (2 to 2.65; one of 2.65 mm stands 0.65 mm out at the skin)"
-    )
+    assert lines[1].startswith("measure first; assumed: motor.thickness_mm = 2 (2 to 2.65)")
     minutes = duration(procedure["printing"]["minutes"])
     how = f"layers 0.2, first layer 0.2 mm; about {minutes}, at most "
     assert lines[2].startswith(f"print each STL of moulds/ (no 3MF was asked for): {how}")
     assert lines[2].endswith(". Mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30.")
     out, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
     assert lines[3] == (
-        f"2 pours, {bench} at the bench. Out of the mould {out} after the print. Motor in 24 h 5 min after that."
+        f"2 pours, {bench} at the bench. Out of the mould {out} after the print. Motor in: 5 min more at the bench, then "
+        "24 h to let the adhesive cure."
     )
     checks = manifest["mould_checks"]
     assert lines[0].endswith(f"; checks: {sum(one['ok'] for one in checks)} of {len(checks)}")

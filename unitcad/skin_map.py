@@ -264,7 +264,7 @@ def _felt_line(kind: Kind) -> str:
     one = kind.threshold
     um, own = number(one.um.value or 0.0, 2), "typed" if not one.site else f"{one.site}, level {one.status}"
     ends = "" if not one.site else f" ({number(one.um.low or 0.0, 2)} to {number(one.um.high or 0.0, 2)})"
-    where = f"{_length(kind.felt_mm)} from the middle" if kind.felt_mm.value != 0 else "nowhere"
+    where = f"{_length(kind.felt_mm)} from the middle of a unit" if kind.felt_mm.value != 0 else "nowhere"
     ranged = "" if kind.felt_mm.value != 0 or kind.felt_mm.high == 0 else f"; at most {_length(kind.felt_mm)}"
     return f"Felt radius: {where}{ranged}. Threshold of touch at {kind.frequency_hz:g} Hz: {um} um{ends}, {own}."
 

@@ -117,7 +117,7 @@ def test_the_sheet_begins_with_what_to_measure():
     (command,) = re.findall(r"^unitcad build spec.toml (.*)$", text, re.MULTILINE)
     assert text.index("## 0. Measure first") < text.index("## Print") < text.index("## Before the first pour")
     assert load("encapsulating", command.replace("--set ", "").split()) == spec
-    assert "motor thickness: 2 mm (assumed; 2 to 2.65; one of 2.65 mm stands 0.65 mm out at the skin)" in text
+    assert "motor thickness: 2 mm (assumed; 2 to 2.65). A motor of 2.65 mm stands 0.65 mm out at the skin." in text
     wires = {size.keys[0] for size in casting("no-fpcb").printing.sizes}
     assert "wires.diameter_mm" in wires
     assert "fpcb.thickness_mm" not in wires

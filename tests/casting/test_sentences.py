@@ -14,7 +14,7 @@ from unitcad.errors import UnitcadError
 
 FILES = {"say": "casting/procedure.toml"}
 """File of words by the name that writes them."""
-MODULES = ("casting.preparation", "casting.pouring", "casting.troubles")
+MODULES = ("casting.preparation", "casting.resin", "casting.pouring", "casting.troubles")
 LONGEST = 40
 """Characters of a text in the code: a title or a fact, no sentence."""
 

@@ -63,12 +63,15 @@ def test_the_command_prints_units_and_writes_nothing(tmp_path):
     before = sorted(tmp_path.iterdir())
     done = unitcad("fit", path, "--check")
     assert done.returncode == 0
-    assert "0.05 (0.045 to 0.055) of the motor's amplitude at 125.0 Hz" in done.stdout
-    assert "walls as measured, 1.27, 1.22 mm; the rule expects 0.0" in done.stdout
+    assert "5 % (4.5 to 5.5) of the motor's amplitude at 125.0 Hz" in done.stdout
+    assert "walls as measured, 1.27, 1.22 mm; the rule expects 3." in done.stdout
     assert done.stdout.splitlines()[-1] == "1 unit: nothing is missing"
     data = json.loads(unitcad("fit", path, "--check", "--json").stdout)
     assert (data["complete"], data["lacks"], data["units"][0]["far"]) == (True, [], False)
     assert sorted(tmp_path.iterdir()) == before
+    # A level that is off is no missing field, and the last line points to it.
+    last = unitcad("fit", LAB / "contribution.toml", "--check").stdout.splitlines()[-1]
+    assert last.startswith("1 unit: every field is there; look at the level of ")
     refused = unitcad("fit", path, "--check", "-o", tmp_path / "out")
     assert (refused.returncode, "leave out --out" in refused.stderr) == (2, True)
 

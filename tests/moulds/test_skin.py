@@ -56,7 +56,7 @@ def test_the_procedure_ends_with_the_skin(source):
     made = procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
     assert broken_rules(made) == []
     assert (made.later_mixes, made.last) == (1, "Motor in and skin on")
-    assert " Motor in and skin on, with 1 more mix, " in [*casting_summary(msgspec.to_builtins(made))][1]
+    assert " Motor in and skin on, with 1 more mix: " in [*casting_summary(msgspec.to_builtins(made))][1]
     on, cure = made.assembly[-2:]
     assert (on.title, cure.title) == ("Skin on", "Let the skin cure")
     assert on.picture == picture_path("skin-on")

@@ -39,7 +39,7 @@ FAR = (
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
 RANGE = (
     "moduli, damping and thicknesses of the tissue, and the frequency, at both ends of their ranges, one kind at a "
-    "time; and the effect of a unit on the skin, bonded or resting, by finite elements (`CONTACT`)"
+    "time; and the effect of a unit on the skin, bonded or resting, by finite elements"
 )
 CONTACT_MM = (0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 CONTACT: dict[Drive, tuple[tuple[float, ...], tuple[float, ...]]] = {

@@ -111,10 +111,10 @@ def to_markdown(procedure: Procedure) -> str:
 def _measuring(procedure: Procedure) -> Iterator[str]:
     """Yield the measures to take before printing, and how to build again with other sizes."""
     printing = procedure.printing
-    yield from (
-        f"- {size.what}: {number(size.value_mm, 3)} mm{f' (assumed; {size.assumed})' if size.assumed else ''}"
-        for size in printing.sizes
-    )
+    for size in printing.sizes:
+        how, _, more = size.assumed.partition("; ")
+        told = f" (assumed; {how}){f'. {more[0].upper()}{more[1:]}.' if more else ''}" if how else ""
+        yield f"- {size.what}: {number(size.value_mm, 3)} mm{told}"
     differ = f"If calipers differ by more than {number(MEASURED_MM, 2)} mm"
     yield f"\n{differ}, build again with your figures."
     sets = " ".join(f"--set {key}={number(size.value_mm, 3)}" for size in printing.sizes for key in size.keys)

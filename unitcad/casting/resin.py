@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from manifold3d import CrossSection, Manifold, OpType
 
 from unitcad.casting.figures import BAKE_H, MIXING_MIN, WEIGH_MIN, cure_hours, in_room
+from unitcad.casting.sentences import say
 from unitcad.casting.steps import BenchStep
 from unitcad.casting.views import picture_path
 from unitcad.catalogue import RESIN, Material, materials, surface_contact
@@ -154,31 +155,28 @@ def piece_wells(moulds: MouldSet) -> dict[str, Well]:
 
 def plate_sentences(moulds: MouldSet) -> list[str]:
     """Say how the plate is printed in resin: attitude, wells, exposure, draining."""
-    said = [
-        "Flat on the plate: rims come out level and sharp.",
-        "Expose as the resin's maker says, with as few bottom layers as hold the pieces. If windows close or engravings "
-        "fill, expose less; the leak coupon shows it.",
-    ]
+    said = [say("print_resin.flat"), say("print_resin.expose")]
     if found := piece_wells(moulds):
         each = [
-            f"{moulds.plan.called(name)} {number(well.volume_mm3 / 1000, 2)} ml up to {number(well.opens_mm, 2)} mm, "
-            f"held by at most {number(well.force_n, 2)} N"
+            say(
+                "print_resin.well",
+                piece=moulds.plan.called(name),
+                volume=number(well.volume_mm3 / 1000, 2),
+                opens=number(well.opens_mm, 2),
+                force=number(well.force_n, 2),
+            )
             for name, well in found.items()
         ]
-        said += [
-            f"Wells, closed by plate and film: {'; '.join(each)}. Lift by 1 mm/s or less up to there (assumed).",
-            f"If such a piece tears off, level supports {number(SUPPORT_MM, 2)} mm high avoid the well. Then rub its rim "
-            "flat on 400 grit paper.",
-        ]
-    return [*said, f"Let it drip for {DRIP_MIN} minutes, tilted (assumed)."]
+        said.append(say("print_resin.wells", wells="; ".join(each)))
+        said.append(say("print_resin.supports", height=number(SUPPORT_MM, 2)))
+    return [*said, say("print_resin.drip", minutes=DRIP_MIN)]
 
 
 def clean_resin(moulds: MouldSet, silicones: Sequence[Material], away: str) -> Iterator[BenchStep]:
     """Describe how pieces of resin get clean and cured; `away`: the sentence on surfaces that inhibit a cure."""
     yield BenchStep(
-        "Wash",
-        f"Wash the pieces in two baths of isopropanol, {BATH_MIN} minutes each (assumed), holes too, until nothing feels "
-        f"slippery. Dry them until no spot is dark.{away}",
+        say("wash.title"),
+        say("wash.text", minutes=BATH_MIN) + away,
         kind="rest",
         minutes=15.0,
         wait_min=30.0,
@@ -189,17 +187,15 @@ def clean_resin(moulds: MouldSet, silicones: Sequence[Material], away: str) -> I
         windows = [window_section(moulds.spec, exit, step.rim) for step in steps]
         height = number(min(high - low for _, low, high in windows), 2)
         yield BenchStep(
-            "Clear the windows",
-            f"Clear the windows of {join_words(spaced(step.cup) for step in steps)}, {height} mm high, of resin: rinse "
-            "each with a syringe of isopropanol and push the tongue through until it slides freely.",
+            say("clear_windows.title"),
+            say("clear_windows.text", cups=join_words(spaced(step.cup) for step in steps), height=height),
             picture_path("pieces"),
             minutes=5.0 * len(steps),
             required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
         )
     yield BenchStep(
-        "Post-cure, bake",
-        "Resin keeps many platinum silicones from curing: post-cure, bake at 60 degC for "
-        f"{number(BAKE_H, 2)} h (assumed). Cure the pieces dry, from all sides.",
+        say("bake.title"),
+        say("bake.text", hours=number(BAKE_H, 2)),
         kind="cure",
         minutes=10.0,
         wait_min=60 * BAKE_H,
@@ -209,10 +205,8 @@ def clean_resin(moulds: MouldSet, silicones: Sequence[Material], away: str) -> I
     drops = {each.name: cure_hours(each, room) for each in silicones}
     each = ", ".join(f"{name} {in_room(hours, 'h', room)}" for name, hours in drops.items())
     yield BenchStep(
-        "Test the cure",
-        "Cure a drop of each silicone on the base, off the cavity, for its whole cure "
-        f"({each}). If its underside is tacky, coat the pieces with acrylic varnish (assumed), let them dry for "
-        f"{DRY_MIN} minutes and test again, or change the resin.{_other_chemistry(moulds, silicones)}",
+        say("test_cure.title"),
+        say("test_cure.text", times=each, minutes=DRY_MIN) + _other_chemistry(moulds, silicones),
         kind="cure",
         minutes=WEIGH_MIN + MIXING_MIN,
         wait_min=60 * max(drops.values()),
@@ -229,10 +223,8 @@ def _other_chemistry(moulds: MouldSet, silicones: Sequence[Material]) -> str:
     ]
     if not tin:
         return ""
-    return (
-        f" Or cast a silicone of tin for all layers: {join_words(_stiffness(each) for each in tin)}; "
-        f"yours: {join_words(_stiffness(each) for each in silicones)}."
-    )
+    ours, yours = (join_words(map(_stiffness, each)) for each in (tin, silicones))
+    return f" {say('test_cure.tin', tin=ours, yours=yours)}"
 
 
 def _stiffness(silicone: Material) -> str:

@@ -152,10 +152,13 @@ def casting_summary(procedure: Mapping[str, Any], files: Iterable[str] = ()) -> 
     count = f"{len(pours)} pour{'s' if len(pours) > 1 else ''}"
     if castings:
         count = f"{castings} casting{'s' if castings > 1 else ''} of units and {count} of the sheet"
-    later = procedure["time_line"][-1]
-    more = later["start_min"] + later["bench_min"] + later["wait_min"] - procedure["earliest_finish_min"]
-    mixed = f", with {mixes} more mix{'es' if mixes > 1 else ''}," if mixes else ""
-    then = f" {procedure['last']}{mixed} {duration(more)} after that." if procedure["assembly"] else ""
+    then, after = "", procedure["assembly"]
+    if after:
+        mixed = f", with {mixes} more mix{'es' if mixes > 1 else ''}" if mixes else ""
+        waits = ((each["wait_min"], each["title"]) for each in after if each["wait_min"])
+        cures = join_words([f"{duration(wait)} to {title[0].lower()}{title[1:]}" for wait, title in waits])
+        later = duration(sum(each["minutes"] for each in after))
+        then = f" {procedure['last']}{mixed}: {later} more at the bench{f', then {cures}' if cures else ''}."
     printing = procedure["printing"]
     time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
     layers = f"layers {number(printing['layer_mm'], 3)}, first layer {number(printing['first_layer_mm'], 3)} mm"

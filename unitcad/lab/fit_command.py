@@ -16,6 +16,7 @@ from unitcad import files
 from unitcad.attenuation.edge.models import BASELINE, RULE
 from unitcad.attenuation.edge.ranges import PERCENT, ModelFit, quantiles
 from unitcad.attenuation.edge.scoring import OVERTURNED, sign_flip_p
+from unitcad.attenuation.edge.words import spread
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
 from unitcad.cli.tables import console
@@ -28,6 +29,7 @@ from unitcad.lab.fitting import FitLab, Fitted, fit_lab, load_fit_lab
 from unitcad.lab.random_effects import Effect
 from unitcad.spec.convert import without_none
 from unitcad.spec.toml import text_of
+from unitcad.text import join_words, number
 
 FIT = "lab-fit.toml"
 DIFFERING = (
@@ -123,9 +125,9 @@ def effect_rows(result: Fitted) -> list[dict[str, Any]]:
     A lab's is over this lab's, a batch's over the mean batch's. A scatter is a factor too: exp of a standard deviation.
     """
     found, labs, batches = result.leading, result.lab.labs, result.lab.batches
-    rows = [("lab", labs[number], one) for number, one in found.labs.items()]
-    for number, one in found.batches.items():
-        lab, name = batches[number]
+    rows = [("lab", labs[i], one) for i, one in found.labs.items()]
+    for i, one in found.batches.items():
+        lab, name = batches[i]
         rows.append(("batch", f"{lab}, {name}" if lab else name, one))
     rows += [
         ("scatter", f"between {kind}", Effect(*(float(np.exp(getattr(one, end))) for end in ("value", "low", "high"))))
@@ -304,13 +306,19 @@ def _print_check(loaded: FitLab, as_json: bool) -> None:
         print_json({"name": loaded.settings.name, "complete": not found, "units": rows, "lacks": data})
     else:
         for row in rows:
-            ends = "" if row["low"] is None else f" ({row['low']:.3g} to {row['high']:.3g})"
-            level = f"{row['level']:.3g}{ends} of the motor's amplitude at {row['frequency_hz']:.1f} Hz"
+            ends = "" if row["low"] is None else f" ({number(100 * row['low'], 3)} to {number(100 * row['high'], 3)})"
+            level = f"{number(100 * row['level'], 3)} %{ends} of the motor's amplitude at {row['frequency_hz']:.1f} Hz"
             typer.echo(f"{row['unit']}: {level}; {row['source']}{_expected(row)}")
         for one in found:
             warn(f"{one.where}: {one.message}")
         count = f"{len(rows)} unit{'s' if len(rows) > 1 else ''}"
-        typer.echo(f"{count}: nothing is missing" if not found else f"{count}; {len(found)} to settle")
+        off = [row["unit"] for row in rows if row["far"]]
+        look = f"; look at the level of {join_words(off)}" if off else ""
+        typer.echo(
+            f"{count}: {'every field is there' if off else 'nothing is missing'}{look}"
+            if not found
+            else f"{count}; {len(found)} to settle{look}"
+        )
     if found:
         sys.exit(1)
 
@@ -320,7 +328,7 @@ def _expected(row: dict[str, Any]) -> str:
     if row["expected_low"] is None:
         return ""
     far = ", far from this level: check the motor's amplitude and the units" if row["far"] else ""
-    return f"; the rule expects {row['expected_low']:.3g} to {row['expected_high']:.3g}{far}"
+    return f"; the rule expects {spread(row['expected_low'], row['expected_high'])}{far}"
 
 
 def _print(result: Fitted) -> None:

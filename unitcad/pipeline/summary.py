@@ -57,8 +57,10 @@ def unit_summary(moulds: MouldSet, folder: Path, manifest: Manifest) -> Iterator
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
     """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
     if assumed := assumed_lengths(spec, given, path):
-        lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, how in assumed.items())
-        yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
+        told = {key: how.partition("; ") for key, how in assumed.items()}
+        lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, (how, _, _) in told.items())
+        lengths += "".join(f". {more[0].upper()}{more[1:]}" for _, _, more in told.values() if more)
+        yours = f". Build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
         yield f"measure first; assumed: {lengths}{yours}"
 
 

@@ -231,7 +231,9 @@ def assumed_lengths(spec: Spec, given: Container[str] = (), path: str = "") -> d
     }
     if (key := "motor.thickness_mm") in found and motor and motor.thickness_mm.high:
         proud = motor.thickness_mm.high - spec.motor.thickness_mm
-        found[key] += f"; one of {number(motor.thickness_mm.high, 3)} mm stands {number(proud, 2)} mm out at the skin"
+        found[key] += (
+            f"; a motor of {number(motor.thickness_mm.high, 3)} mm stands {number(proud, 2)} mm out at the skin"
+        )
     if spec.fpcb and spec.fpcb.thickness_mm == FpcbTable().thickness_mm:
         found["fpcb.thickness_mm"] = "usual stock"
     return {key: how for key, how in found.items() if path + key not in given}
