@@ -89,7 +89,7 @@ def test_no_text_is_on_a_line_and_scales_are_those_of_iso_5455(name):
 
 
 def test_the_patch_is_measured_from_its_edges():
-    moulds, (patch, *_) = sheets_of("forearm-patch")
+    moulds, (patch, *tools) = sheets_of("forearm-patch")
     silicone = [body for body in patch_bodies(moulds.array) if body.made == "cast"]
     boxes = np.array([bounds(realise(body.shape, moulds.segments)) for body in silicone])
     (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 3:5].max(axis=0)
@@ -110,3 +110,4 @@ def test_the_patch_is_measured_from_its_edges():
     assert len(motors) == 9
     assert [(hole.name, hole.size) for hole in patch.holes][-2:] == [("S1", "3 x 26"), ("S2", "3 x 26")]
     assert [note.text for note in patch.plan.notes] == ["4× R10"]
+    assert [[hole.size for hole in tool.holes if hole.name[0] == "S"] for tool in tools] == [[], [], ["3 x 26"] * 2, []]

@@ -83,6 +83,7 @@ def test_lengths_are_those_of_the_plan():
     for cup, radius in zip((cup1, cup2), dims.radii, strict=True):
         assert f"Ø{2 * radius:g}" in [one.text for one in cup.checks]
         assert f"{slot + 2 * play:g} x 0.8" in [one.text for one in cup.front.lengths]
+    assert [one.name for one in cup1.front.lengths if one.running] == ["", "depth from below", "", "", "height"]
     assert f"{slot:g}" in [one.text for one in tongue.checks]
     assert "12" in [one.text for one in blade.checks]
 

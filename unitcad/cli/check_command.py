@@ -13,8 +13,10 @@ import typer
 from unitcad import catalogue
 from unitcad.cli.output import progress
 from unitcad.documents import read_toml
+from unitcad.errors import Refusal
 from unitcad.meshcheck import compare, file_checks
 from unitcad.meshcheck.arguments import Arguments, Option
+from unitcad.meshcheck.rules.inspection import Options
 from unitcad.meshcheck.rules.registry import explain as explanation
 from unitcad.meshcheck.run import Tools, run
 from unitcad.rooms import expect_none_but, load
@@ -29,7 +31,20 @@ def check(**given: Any) -> None:
     if arguments.explain is not None:
         sys.stdout.write(_explained([part.strip() for part in ",".join(arguments.explain).split(",")]) + "\n")
         return
+    if arguments.repair is not None:
+        _repair(arguments.files or [], arguments.repair)
+        return
     raise typer.Exit(run(arguments, _TOOLS))
+
+
+def _repair(names: list[str], target: str) -> None:
+    """Write a closed copy of a file, and say how far it is from the file. Raises Refusal."""
+    if len(names) != 1 or not Path(names[0]).is_file():
+        raise Refusal("--repair", target, "takes one mesh file: unitcad check FILE --repair OUT.stl")
+    from unitcad.pipeline.repair import repair  # loads manifold3d
+
+    far = repair(Path(names[0]), Path(target), Options())
+    sys.stdout.write(f"{target}: closed copy of {names[0]}, at most {far:.3g} mm off its surface\n")
 
 
 def _signature() -> inspect.Signature:

@@ -119,6 +119,15 @@ class Arguments:
         str | None,
         Option("Write the findings of this run to a file as known. Default: none.", "--write-baseline", metavar="FILE"),
     ] = None
+    repair: Annotated[
+        str | None,
+        Option(
+            "Write a closed copy of FILE, its nearly meeting edges joined. Default: none.",
+            "--repair",
+            metavar="OUT.stl",
+            whole="the library manifold3d",
+        ),
+    ] = None
     quiet: Annotated[bool, Option("Print the findings that fail, and one line of sums.", "--quiet", "-q")] = False
     config: Annotated[
         str | None,

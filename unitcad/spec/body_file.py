@@ -28,6 +28,8 @@ from unitcad.shape.profile import FACETS, GRID_PER_MM
 
 MOST_FACES = 40_000
 """Most triangles of all bodies together, for which the moulds take about a minute."""
+SAID = 3
+"""Findings of a body's check that its refusal has."""
 _HEAD = "unitcad bodies 1"
 _NAME = re.compile(r"layer[1-9][0-9]?|motor|fpcb|[a-z][a-z0-9-]{0,31}")
 _HALF = 0.5 + 1e-6
@@ -51,8 +53,13 @@ def body_text(design: str, path: Path) -> str:
     for finding in (*report.findings, *scale):
         if finding.code == F011.code:
             raise Unfinished(f"{path}: its check was not finished: {finding.message}")
-        if finding.severity == "error" or finding.code == s_scale.S001.code:
-            raise Refusal("design", design, f"{finding.code}: {finding.message}")
+    wrong = [each for each in (*report.findings, *scale) if each.severity == "error" or each.code == s_scale.S001.code]
+    if wrong:
+        said = "; ".join(f"{each.code}: {each.message}" for each in wrong[:SAID])
+        said += f"; and {len(wrong) - SAID} more findings of `unitcad check`" if len(wrong) > SAID else ""
+        open_ = any(each.code.startswith("T") for each in wrong)
+        copy = f"; `unitcad check {design} --repair closed.stl` tries to make a closed copy" if open_ else ""
+        raise Refusal("design", design, said + copy)
     try:
         bodies = _bodies(path)
     except Unfinished:
