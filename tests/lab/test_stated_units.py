@@ -397,9 +397,13 @@ def test_a_file_that_states_a_wrong_unit_gives_no_level(tmp_path):
     assert "factor of 1e+03, read in mm/s: e0.csv, e2.csv, um/s: e1.csv" in found.message
 
 
-@pytest.mark.parametrize(("factor", "refused"), [(370.0, True), (2.9, False), (2e-4, False), (0.9e-4, True)])
-def test_a_level_out_of_range_is_refused_with_the_units(factor, refused, tmp_path):
-    edge = [("", factor)] * 3
+@pytest.mark.parametrize(
+    ("stated", "factor", "refused"),
+    [("", 370.0, True), ("", 2.9, False), ("", 1.1e-3, False), ("", 0.9e-3, True), ("mm/s", 2e-4, False)],
+)
+def test_a_level_out_of_range_is_refused_with_the_units(stated, factor, refused, tmp_path):
+    """A file that states no unit may be a prefix off: an edge at 0.04 to 0.9 of the motor's then seems to be below 0.001."""
+    edge = [(stated, factor)] * 3
     if refused:
         with refuses("u, edge", "read in mm/s (not stated) at the place and mm/s at the motor"):
             apart(tmp_path, [MM] * 3, edge)

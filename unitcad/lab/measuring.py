@@ -31,6 +31,8 @@ MOST_APART = 0.1
 """Part of the motor's frequency by which the unit's may differ: beyond, it is another motor's."""
 LEVELS = (1e-4, 3.0)
 """A level beyond these is that of a wrong unit: measured levels are 0.04 to 1, and prefixes differ by 1000."""
+LEAST_UNSTATED = 1e-3
+"""The least level at an edge if a file states no unit: a thousandth of a measured level is below it."""
 MOST_BETWEEN_REPEATS = 10.0
 """Factor between repeats beyond which they are not of one place, or not in the units that they are read in."""
 
@@ -214,9 +216,13 @@ def _levels(
             findings.append(doubt)
             continue
         result = level(values, None if paired else below)
-        if not LEVELS[0] <= result.value <= LEVELS[1]:
+        units = [record.units[0] for record in near] + (
+            [near[0].units[1]] if paired else [one.units[0] for one in base]
+        )
+        least = LEVELS[0] if distance or all(one.stated for one in units) else LEAST_UNSTATED
+        if not least <= result.value <= LEVELS[1]:
             read = f"read in {_units(near)} at the place and {_units(near, 1) if paired else _units(base)} at the motor"
-            limit = f"is the level by {chain}; it must be from {LEVELS[0]:g} to {LEVELS[1]:g}. Is a unit wrong? {read}"
+            limit = f"is the level by {chain}; it must be from {least:g} to {LEVELS[1]:g}. Is a unit wrong? {read}"
             raise Refusal(where, float(f"{result.value:.4g}"), limit)
         levels.append(PlaceLevel(unit.name, distance, chain, result, hertz))
         if result.scatter > MOST_DISAGREEMENT:
