@@ -13,7 +13,7 @@ from unitcad.errors import Refusal, WrongArgument
 from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import motor_of
-from unitcad.validation import from_data, read, warnings
+from unitcad.validation import from_data, load, read, warnings
 
 MOTORS = catalogue.motors()
 
@@ -182,6 +182,17 @@ def test_the_motors_are_those_of_a_shop():
         assert (each.test_mass_g is None) or each.acceleration_g
         if each.rpm and each.frequency_hz:  # a motor's force turns once a revolution
             assert float(each.frequency_hz) == pytest.approx(float(each.rpm) / 60, rel=0.01)
+
+
+def test_a_stock_first_layer_stays_when_the_others_are_finer():
+    for name in ("prusa-mk3s", "prusa-mk4", "bambu-a1", "bambu-p1", "ender-3"):
+        first = catalogue.printers()[name].first_layer_mm
+        assert first
+        assert first.value == 0.2
+        assert first.source.endswith("initial_layer_print_height")
+        lengths = load("encapsulating", [f"moulds.printer={name}", "moulds.layer_mm=0.1"]).moulds
+        assert (lengths.layer_mm, lengths.first_layer_mm) == (0.1, 0.2)
+    assert load("encapsulating", ["moulds.layer_mm=0.1"]).moulds.first_layer_mm == 0.1
 
 
 def test_list_shows_what_a_cupboard_holds(tmp_path):

@@ -57,6 +57,16 @@ def test_every_value_has_its_source_and_keeps_the_laws(name):
             assert values[key].method
 
 
+def test_slacker_softens_its_base():
+    """By the bulletin; a scale of more noughts is a softer one."""
+    for base in ("ecoflex-00-20", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10"):
+        parts = sorted(int(name.rpartition("-")[2]) for name in SHIPPED if name.startswith(f"{base}-slacker-"))
+        shore = [known(f"{base}-slacker-{each}", "shore").partition("-") for each in parts]
+        hard = [(-len(scale), float(points)) for scale, _, points in shore]
+        assert len(hard) >= 2
+        assert hard == sorted(hard, reverse=True)
+
+
 def test_harder_silicones_are_stiffer():
     """By Gent's relation of hardness and modulus (1958), which is high for soft grades: unit errors are a factor 10."""
     pairs = []

@@ -76,6 +76,7 @@ OTHERS = {
     "printers.ours.bed_y_mm": (40.0,),
     "design_source": (_SOURCE.replace("2.2", "2.4"),),
     "motor.at": ([0.5, 0.0, 0.0],),
+    "moulds.parting": ("z=1",),
     "body.file": ("other.stl",),
     "body.file_source": (_body_text(17),),
     "estimate.fit": ("other.toml",),

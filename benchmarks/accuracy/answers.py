@@ -69,7 +69,7 @@ def _stability(result: Result) -> str:
 
 
 def _models(result: Result) -> str:
-    return f"The estimate misses a unit that it was not fitted to by {ANY_FORM}."
+    return f"The estimate misses a new unit by {ANY_FORM}."
 
 
 def _fem(result: Result) -> str:

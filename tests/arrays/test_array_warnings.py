@@ -1,20 +1,23 @@
 """What an array warns of: too many motors for its circuit's width, a groove drawn less deep than asked for."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from html import escape
 
 import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.array_page import write_array_page
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.arrayed import said_of_unit
 from unitcad.arrays.circuit import GAP_MM, TRACK_MM, crowded_tracks
 from unitcad.arrays.patch import patch_moulds
+from unitcad.casting.procedure import procedure as unit_procedure
+from unitcad.casting.steps import casting_summary
 from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.heights import as_printed, height_warnings
-from unitcad.moulds.mould_set import shallow_grooves
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.write import build as build_array
 
 
@@ -79,6 +82,13 @@ def test_a_placed_unit_of_another_kind_is_named_by_its_place():
     said = [line for unit in array.units for line in said_of_unit(array, unit).values()]
     assert any("; unit.layers.0.cap_mm = " in line for line in said)
     assert any("; place.0.unit.layers.0.cap_mm = " in line for line in said)
+
+
+def test_units_go_into_their_pockets_without_a_wait():
+    moulds = patch_moulds(load_array("forearm-pockets"))
+    own = MouldSet(moulds.array.unit)
+    procedure = array_procedure(moulds, [1000.0], 0.0, {"units/one": unit_procedure(own, [100.0, 100.0])})
+    assert [*casting_summary(asdict(procedure))][1].endswith(" Units in: 18 min more at the bench.")
 
 
 def test_a_curved_array_has_caps_only():

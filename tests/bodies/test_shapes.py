@@ -107,3 +107,30 @@ def test_the_sheet_says_how_a_parted_mould_is_used(name, said, tmp_path):
     # Each step's picture is drawn, and each view belongs to a step.
     every = [*made.preparation, *made.pours[0].steps, *made.release]
     assert {step.picture for step in every if step.picture} == {picture_path(view) for view in views(moulds)}
+
+
+@pytest.mark.parametrize(
+    ("parting", "z", "way"),
+    [("z=3", 3.0, "as drawn: two halves"), ("z=1", 1.0, "no mould")],
+)
+def test_a_mould_comes_apart_at_the_named_plane(parting, z, way, tmp_path):
+    """A barrel has its widest level at z = 3; at z = 1 the upper half would catch it."""
+    if way == "no mould":
+        with pytest.raises(Refusal, match="no mould that comes apart there") as refused:
+            _ = moulds_of(tmp_path, "union([cone(4, 6, 0, 3), cone(6, 4, 3, 6)])", f"moulds.parting={parting}").plan
+        assert refused.value.field == "moulds.parting"
+        return
+    moulds = moulds_of(tmp_path, "union([cone(4, 6, 0, 3), cone(6, 4, 3, 6)])", f"moulds.parting={parting}")
+    assert moulds.plan.way.startswith(way)
+    (layer,) = moulds.meshes(moulds.plan.steps[0].layer)
+    assert layer.bounding_box()[2] == pytest.approx(-z, abs=1e-3)
+    assert [finding for finding in check_moulds(moulds) if not finding.ok] == []
+    assert list(collisions(moulds)) == []
+
+
+def test_a_parting_is_refused_beside_the_body_and_for_a_design_that_has_none(tmp_path):
+    with pytest.raises(Refusal, match="misses the body, which reaches from 0 to 6") as refused:
+        _ = moulds_of(tmp_path, "union([cone(4, 6, 0, 3), cone(6, 4, 3, 6)])", "moulds.parting=z=9").plan
+    assert refused.value.nearest == "z=3"
+    with pytest.raises(Refusal, match="custom design"):
+        load("encapsulating", {"moulds.parting": "z=1"})

@@ -29,6 +29,10 @@ def test_every_template_is_shown_and_judged(live):
             assert "The unit comes out 4.6 mm high (drawn 4.61), caps 1.2 and 1.2. Print" in live.page.inner_text(
                 "#glance"
             )
+            first = live.page.locator('input[name="moulds.first_layer_mm"]')
+            first.evaluate(
+                "node => { for (let up = node; up; up = up.parentElement) if ('open' in up) up.open = true; }"
+            )
             live.choose('input[name="moulds.first_layer_mm"]', "0.35")
             assert live.state.endswith(", 1 warning")
             assert "Warning: layer 1's cap comes out 1.15 mm for 1.25" in live.page.inner_text("#glance")

@@ -6,14 +6,15 @@ each was tried.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 
 from manifold3d import Manifold
+from msgspec import UNSET
 
 from unitcad.bodies.parted import Impossible, Mould, closed_cups, draw, inside
-from unitcad.bodies.search import Way, ways
+from unitcad.bodies.search import Way, ways, ways_at
 from unitcad.checks import check_geometry, strains
 from unitcad.checks.finding import MouldFinding, at_least, at_most
 from unitcad.checks.overlap import OF_UNIT
@@ -53,6 +54,8 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
         return _closed(spec, cast, first, planned) if isinstance(first, Refusal) else first
     if design_of(spec).laid_in:
         return _or_raise(first)
+    if spec.moulds.parting is not UNSET:
+        return _named(spec, cast[0], str(spec.moulds.parting), planned)
     tried = [_AS_DRAWN]
     if isinstance(first, Tooling):
         failed = _failed(spec, planned(first))
@@ -83,6 +86,31 @@ def tooling(spec: Spec, cast: Sequence[Shape], first: Tooling | Refusal, planned
     raise Refusal("design", spec.design, f"no mould was found; tried {'; '.join(tried[:SAID])}{UNIT_ALONE}")
 
 
+def _named(spec: Spec, body: Shape, parting: str, planned: Callable[[Tooling], Plan]) -> Tooling:
+    """Return the tooling of the first way that comes apart at the named plane. Raises Refusal if none does."""
+    axis, place = "xyz".index(parting[0]), float(parting[2:])
+    box, tried = bounds(realise(body, _segments(spec))), list[str]()
+    low, high = box[axis], box[axis + 3]
+    if not low < place < high:
+        limit = f"the plane misses the body, which reaches from {low:.4g} to {high:.4g} mm"
+        raise Refusal("moulds.parting", parting, limit, f"{parting[0]}={(low + high) / 2:.4g}")
+    _refuse_hollows(spec, body)
+    for way, drawn in _made(spec, body, ways_at(axis, place)):
+        if isinstance(drawn, str):
+            tried.append(f"{way.said}: {drawn}")
+            continue
+        made = replace(drawn.tooling, way=way.said, bench=BENCH)
+        if not (failed := _failed(spec, planned(made))):
+            return made
+        tried.append(f"{way.said}: {_said(failed[0])}")
+    limit = f"no mould that comes apart there was found; tried {'; '.join(tried[:SAID])}; leave it out to search"
+    raise Refusal("moulds.parting", parting, limit)
+
+
+def _segments(spec: Spec) -> int:
+    return segment_count(spec.diameter_mm / 2, spec.output.tolerance_mm)
+
+
 def _closed(spec: Spec, cast: Sequence[Shape], first: Refusal, planned: Callable[[Tooling], Plan]) -> Tooling:
     """Return the tooling of several pours in closed cups. Raises the first refusal if that does not help either."""
     if first.field not in _OF_THE_BODY:
@@ -111,7 +139,7 @@ def _or_raise(first: Tooling | Refusal) -> Tooling:
 
 def _refuse_hollows(spec: Spec, body: Shape) -> None:
     """Raise Refusal for a hollow that is closed all round: no mould forms it, whichever way it comes apart."""
-    solid = realise(body, segment_count(spec.diameter_mm / 2, spec.output.tolerance_mm))
+    solid = realise(body, _segments(spec))
     x0, y0, z0, x1, y1, z1 = bounds(solid)
     block = Manifold.cube((x1 - x0 + 2, y1 - y0 + 2, z1 - z0 + 2)).translate((x0 - 1, y0 - 1, z0 - 1))
     _, *hollows = sorted(thick_pieces(block - solid, films(spec)), key=lambda piece: -bounds(piece)[3])
@@ -124,8 +152,12 @@ def _refuse_hollows(spec: Spec, body: Shape) -> None:
 
 def _drawn(spec: Spec, body: Shape) -> Iterator[tuple[Way, Mould | str]]:
     """Yield the ways in the order of the search, drawn, or the reason why one can't be."""
-    segments = segment_count(spec.diameter_mm / 2, spec.output.tolerance_mm)
-    for way in islice(ways(*arrays(realise(body, segments))), MOST_DRAWN):
+    yield from _made(spec, body, islice(ways(*arrays(realise(body, _segments(spec)))), MOST_DRAWN))
+
+
+def _made(spec: Spec, body: Shape, tried: Iterable[Way]) -> Iterator[tuple[Way, Mould | str]]:
+    """Yield ways, each with its mould, or the reason why it can't be drawn."""
+    for way in tried:
         try:
             yield way, draw(spec, body, way)
         except Impossible as error:

@@ -102,6 +102,17 @@ def ways(vertices: np.ndarray, faces: np.ndarray) -> Iterator[Way]:
     yield from sorted(caught, key=lambda way: way.caught)
 
 
+def ways_at(axis: int, place: float) -> Iterator[Way]:
+    """Yield the ways whose mould comes apart at a plane across an axis of the body as drawn: halves, then side pieces."""
+    for opened in (True, False):
+        for name, turn in POSES:
+            if side := turn[2][axis]:
+                yield Way(name, turn, "level", (side * place,) * 2, 0.0, opened, 0.0)
+        if axis < 2:
+            name, turn = POSES[0]
+            yield Way(name, turn, "two", (place, place), 90.0 * axis, opened, 0.0)
+
+
 def _upright(
     vertices: np.ndarray, faces: np.ndarray, grid: Voxels
 ) -> Iterator[tuple[str, tuple[float, ...], float, int]]:

@@ -156,9 +156,11 @@ def casting_summary(procedure: Mapping[str, Any], files: Iterable[str] = ()) -> 
     if after:
         mixed = f", with {mixes} more mix{'es' if mixes > 1 else ''}" if mixes else ""
         waits = ((each["wait_min"], each["title"]) for each in after if each["wait_min"])
-        cures = join_words([f"{duration(wait)} to {title[0].lower()}{title[1:]}" for wait, title in waits])
+        cures = [f"{duration(wait)} to {title[0].lower()}{title[1:]}" for wait, title in waits]
         later = duration(sum(each["minutes"] for each in after))
-        then = f" {procedure['last']}{mixed}: {later} more at the bench{f', then {cures}' if cures else ''}."
+        then = (
+            f" {procedure['last']}{mixed}: {later} more at the bench{f', then {join_words(cures)}' if cures else ''}."
+        )
     printing = procedure["printing"]
     time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
     layers = f"layers {number(printing['layer_mm'], 3)}, first layer {number(printing['first_layer_mm'], 3)} mm"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from unitcad import files
 from unitcad.errors import Refusal
@@ -84,7 +84,7 @@ def _open_corners(faces: Ints) -> Ints:
 def _clustered(vertices: Floats, loose: Ints, gap: float) -> tuple[Floats, Ints]:
     """Return vertices, those of `loose` that are within a gap of each other as one in their middle, and each one's place."""
     pairs = (
-        loose[cKDTree(vertices[loose]).query_pairs(gap, output_type="ndarray")] if len(loose) else np.empty((0, 2), int)
+        loose[KDTree(vertices[loose]).query_pairs(gap, output_type="ndarray")] if len(loose) else np.empty((0, 2), int)
     )
     label = components(len(vertices), pairs[:, 0], pairs[:, 1])
     _, index, many = np.unique(label, return_inverse=True, return_counts=True)

@@ -240,6 +240,13 @@ class MouldsTable(Table, frozen=True, kw_only=True):
         float, between(0.5, 100, "thickness of the base's plate; default: 4 mm in whole printed layers")
     ] = DERIVED
     ledge_mm: Annotated[float, between(LEAST_LEDGE, 100, "width of the core's ledge that carries the tongue")] = 0.6
+    parting: Annotated[
+        Annotated[str, Meta(pattern=r"^[xyz]=-?[0-9]+(\.[0-9]+)?$")] | UnsetType,
+        Meta(
+            description='a plane such as "z=3.2" (mm, as drawn), where the mould of a custom body of one layer comes '
+            "apart; default: the best one found"
+        ),
+    ] = UNSET
     shrinkage_percent: Annotated[
         kinds.Shrinkage,
         Meta(description="linear shrinkage that the tools make up for, %; default: the largest of the silicones"),

@@ -110,6 +110,9 @@ def resolve(raw: RawSpec) -> Spec:
         for field in ("parameters", "design_source"):
             if getattr(raw, field):
                 raise Refusal(field, None, f"only a custom design takes it; {raw.design} does not")
+    if raw.moulds.parting is not UNSET and (raw.body or not is_custom(raw.design) or len(raw.layers) > 1):
+        limit = "names the parting of a custom design or a file of bodies with one layer; leave it out"
+        raise Refusal("moulds.parting", raw.moulds.parting, limit)
     design = design_of(raw)
     spec = _with_defaults(raw, design)
     if design.tooling == "complement":

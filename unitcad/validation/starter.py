@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from msgspec import NODEFAULT, Struct
+from msgspec import NODEFAULT, UNSET, Struct
 from msgspec.structs import FieldInfo
 
 from unitcad.documents import read_toml
@@ -81,4 +81,6 @@ def _note(field: FieldInfo) -> str:
 
 def _shown(field: FieldInfo) -> str:
     value = field.default if field.default is not NODEFAULT else field.default_factory()
+    if value is UNSET:
+        return "..."
     return json.dumps(list(value) if isinstance(value, tuple) else value).replace("null", "...")

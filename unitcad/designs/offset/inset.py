@@ -83,10 +83,10 @@ def _level(values: Floats, low: Floats, side: float) -> tuple[Floats, Ints]:
     shape = values.shape
     inside = values > 0
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    many = sum(
-        inside[i : shape[0] - 1 + i, j : shape[1] - 1 + j, k : shape[2] - 1 + k].astype(np.int8)
-        for i, j, k in np.ndindex(2, 2, 2)
-    )
+    parts = [
+        inside[i : shape[0] - 1 + i, j : shape[1] - 1 + j, k : shape[2] - 1 + k] for i, j, k in np.ndindex(2, 2, 2)
+    ]
+    many: Ints = np.sum(parts, axis=0)
     cubes = np.stack(np.nonzero((many > 0) & (many < 8)), axis=1) @ stride
     ways = [np.cumsum([0, *stride[list(axes)]]) for axes in permutations(range(3))]
     odd = [np.linalg.det(np.eye(3)[list(axes)]) < 0 for axes in permutations(range(3))]
@@ -180,7 +180,8 @@ def without_bottom(corners: Floats, faces: Ints) -> Floats:
 
 
 def _off_seat(corners: Floats, faces: Ints) -> Bools:
-    return (np.abs(corners[faces][:, :, 2]) > _SEAT).any(axis=1)
+    heights: Floats = np.abs(corners[faces][:, :, 2]).max(axis=1)
+    return heights > _SEAT
 
 
 def _skirted(corners: Floats, faces: Ints, deep: float) -> tuple[Floats, Ints]:
