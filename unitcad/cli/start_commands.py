@@ -138,7 +138,7 @@ def list_(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Only entries that a file of what you own names, and its own. A kind not named: all.",
+            help="Only entries that a file of what you own names, and its own. Default: all, as of a kind that it does not name.",
         ),
     ] = None,
     as_json: AsJson = False,

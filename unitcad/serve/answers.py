@@ -10,7 +10,7 @@ import re
 import time
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 from msgspec.structs import replace
@@ -93,7 +93,7 @@ def _with_pick(ask: Ask, kind: Any, whole: dict[str, Any], trusted: Trusted, hel
     except UnitcadError:  # refused before
         return None
     changes = changes_of_pick(picked.path, whole, kind.judge, kind.makeable, sound)
-    edits = [Edit(path=path, value=value, remove=value is None) for path, value in changes.items()]
+    edits = [Edit(path=path, value=cast(Any, value), remove=value is None) for path, value in changes.items()]
     if not edits:
         return None
     answer = _answered(replace(ask, edits=[*ask.edits, *edits]), trusted, held)
