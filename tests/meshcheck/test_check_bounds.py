@@ -62,6 +62,18 @@ def test_too_many_pairs_end_a_check_which_says_what_it_found(module, bound, name
     assert report.facts.shells == 21
 
 
+def test_a_soup_of_triangles_is_looked_at_no_further_than_it_takes(monkeypatch, judge):
+    """Once so many pairs meet, the others say nothing new: the same findings, from half the pairs."""
+    soup = stl(np.random.default_rng(3).uniform(0, 10, (700, 3, 3)))
+    whole, looked = judge(soup), []
+    real = crossings._sieved
+    monkeypatch.setattr(crossings, "_sieved", lambda *given: looked.append(len(given[1])) or real(*given))
+    monkeypatch.setattr(crossings, "_BLOCK", 2000)
+    monkeypatch.setattr(crossings, "_FEW", 11_000)
+    assert {one.code for one in judge(soup).findings} == {one.code for one in whole.findings}
+    assert sum(looked) < 100_000
+
+
 def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypatch):
     low = np.random.default_rng(1).uniform(0, 4, (400, 3))
     high = low + 1

@@ -123,7 +123,7 @@ _BLOCK = 1 << 17  # pairs of faces decided together
 _PAIRS = 1 << 15  # of which so many are sieved together: enough to outweigh the calls, few enough for the cache
 _MOST_LOOKS, _LOOKS = 50_000_000, 100  # pairs looked at, in all and a face
 _MANY_TWICE = 1000  # duplicate faces of which all are compared
-_FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
+_FEW = 1_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +286,8 @@ def crossings_of(topology: Topology, tick: Tick) -> Crossings:
                 _decide(faces, waiting, crossings)
                 waiting = []
                 tick()
+                if crossings.kept > _FEW:
+                    break
         _decide(faces, waiting, crossings)
     except Interrupted as stop:
         crossings.stopped = stop
@@ -376,7 +378,7 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> Pairs:
 
 def _decide(faces: Faces, waiting: list[Pairs], crossings: Crossings) -> None:
     """Decide pairs of faces that are near each other: planes first, then exact signs."""
-    if not waiting or crossings.kept > _FEW:
+    if not waiting:
         return
     i, j = (np.concatenate(part) for part in zip(*waiting, strict=True))
     if not len(i):
