@@ -35,7 +35,7 @@ MOST_PAIRS = 10_000_000
 
 _FAN = 4
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
-_WIDE = 1 << 20  # pairs of nodes whose children are held together
+_WIDE = 1 << 18  # pairs of nodes whose children are held together
 _STEP_BITS = 13
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
 _TOP = 65_534  # largest step; 65,535 is an empty box's low corner
