@@ -152,8 +152,8 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
     within = [name for name in folded if len(value) >= _PART_OF_NAME and value.lower() in name]
     within.sort(key=lambda name: (-SequenceMatcher(None, value.lower(), name).ratio(), name))
     close = [folded[name] for name in get_close_matches(value.lower(), folded, n=3, cutoff=0.6)]
-    close = [folded[name] for name in within] if 0 < len(within) <= _MOST_NAMES else close
-    names = f"closest: {', '.join(close)}" if close else f"known: {some(known)}"
+    close = [folded[name] for name in within] or close
+    names = f"closest: {some(close, _MOST_NAMES)}" if close else f"known: {some(known)}"
     return kind(field, value, f"unknown name; {names}", close[0] if close else None)
 
 

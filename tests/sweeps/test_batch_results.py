@@ -246,7 +246,7 @@ def test_init_writes_a_spec_that_names_every_key(tmp_path):
     spec = load(str(tmp_path / "my-unit.toml"))
     assert spec == load("encapsulating", ["name='my-unit'"])
     for path in known_paths(read("encapsulating")):
-        if path not in ("design_source", "estimate.fit_source"):
+        if path not in ("design_source", "body.file_source", "estimate.fit_source"):
             assert re.search(rf"\b{path.rpartition('.')[2]}\b", text), path
     # Taking away one # changes one value, without another word.
     changed = text.replace("# [moulds]", "[moulds]").replace('# printer = "fdm-0.4"', 'printer = "fdm-0.4"')

@@ -295,10 +295,10 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
         table, kind = layout_of(asked)
     except UnknownKey as key:
         limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
-        if key.field in fields_of(RawSpec):
+        if key.root in fields_of(RawSpec) and not key.settled:
             below = next(numbers(key.value), ("", 0))[0]
             limit = f"unknown key; closest: unit.{key.field}{below and f'.{below}'}"
-            raise UnknownKey(key.field, key.value, limit) from None
+            raise UnknownKey(key.root, key.value, limit) from None
         raise _or_of_the_unit(key, limit, data) from None
     way = construction_of(asked.array, asked.limb.cast)
     if way.cast == "curved" and asked.limb.radius_mm is None:

@@ -74,7 +74,9 @@ def _by_meaning(refusal: UnknownKey, data: Mapping[str, Any], kind: Any) -> Unkn
     path, value = lone_path(refusal.field, refusal.value)
     spelt = refusal.nearest is not None and "[" not in refusal.field
     close = None if refusal.settled else meant(path, value, kind, data, least=EXACT if spelt else 1)
-    if not close and path != refusal.field:  # a key of another table, below a name that is no table
+    if (
+        not close and not refusal.settled and path != refusal.field
+    ):  # a key of another table, below a name that is no table
         found = meant(path.rpartition(".")[2], value, kind, data, least=EXACT)
         close = found if len(found) == 1 else None
     if not close:

@@ -64,16 +64,15 @@ def _with_sizes(data: Mapping[str, Any]) -> Mapping[str, Any]:
     body, layers = data.get("body"), data.get("layers")
     if not isinstance(body, Mapping):
         return data
+    table = convert(body, BodyTable, "body")
     for key in _OF_BODY:
         if data.get(key):
             raise Refusal(key, data[key], "a spec with [body] takes it from the body: leave it out")
-    if not isinstance(body.get("file"), str):
-        convert(body, BodyTable, "body")
     if not isinstance(body.get("file_source"), str):
         raise Refusal("body.file_source", None, "is required beside file")
     from unitcad.designs.offset.layers import size_of  # numpy and manifold3d: most specs do without
 
-    across = size_of(convert(body, BodyTable, "body"))[:2]
+    across = size_of(table)[:2]
     sized = {**data, "design": body["file"], "diameter_mm": max(across)}
     if isinstance(layers, list | tuple) and all(isinstance(layer, Mapping) for layer in layers):
         sized["layers"] = [_walled(layers, i, min(across)) for i in range(len(layers))]
