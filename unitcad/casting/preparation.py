@@ -127,7 +127,6 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     names = [join_words(plan.called(one.name).replace(",", "") for one in plate) for plate in files.values()]
     there = "; ".join(f"{path} with {each}" for path, each in zip(files, names, strict=True))
     listed = "print.one_plate" if len(files) == 1 else "print.several_plates"
-    listed = listed if "3mf" in spec.output.formats else "print.each_stl"
     lie = "print.some_turned" if turned else "print.as_they_lie"
     how = [say(listed, lie, count=len(files), plates=there, turned=join_words(turned) if turned else "")]
     layers, printer = in_layers(lengths), lengths.printer
