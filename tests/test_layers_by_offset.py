@@ -7,10 +7,11 @@ from trimesh.creation import box, cylinder, icosphere, torus
 
 from unitcad.checks import check_moulds
 from unitcad.designs import unit_bodies
-from unitcad.designs.offset.inset import CIRCLE, arrays_of, inset, side_of
+from unitcad.designs.offset.inset import CIRCLE, inset, side_of
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape.tree import corners_and_faces
 from unitcad.spec import spec_hash, to_data
 from unitcad.spec.body_file import on_grid
 from unitcad.validation import from_data, load
@@ -62,7 +63,7 @@ def test_an_offset_is_within_its_bound_and_hardly_off_where_smooth(name):
     mesh = drawn()
     body = on_grid("", "body", np.array(mesh.vertices), np.array(mesh.faces))
     side = side_of(body, 1.25, 1.25)
-    corners, faces = arrays_of(inset(body, 1.25, side))
+    corners, faces = corners_and_faces(inset(body, 1.25, side))
     found = trimesh.Trimesh(corners, faces, process=False)
     assert found.is_watertight
     assert found.is_winding_consistent
@@ -76,7 +77,9 @@ def test_an_offset_is_within_its_bound_and_hardly_off_where_smooth(name):
 
 def test_the_wall_of_an_upright_body_stays_upright():
     mesh = placed(cylinder(7, 20, sections=96), 10)
-    corners, faces = arrays_of(inset(on_grid("", "body", np.array(mesh.vertices), np.array(mesh.faces)), 1.25, 0.5))
+    corners, faces = corners_and_faces(
+        inset(on_grid("", "body", np.array(mesh.vertices), np.array(mesh.faces)), 1.25, 0.5)
+    )
     normals = trimesh.Trimesh(corners, faces, process=False).face_normals
     middles = corners[faces].mean(axis=1)
     wall = (middles[:, 2] > 1) & (middles[:, 2] < 17)

@@ -13,7 +13,7 @@ import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold
 
 from unitcad.export.chart import coord
-from unitcad.export.svg import Point, Region, Side
+from unitcad.export.svg import Point, Region, Side, loops_of
 from unitcad.kernels.mesh import arrays, bounds
 
 LEAST_EDGE_MM = 0.45
@@ -73,13 +73,13 @@ class Hole:
     diameters: tuple[float, ...] = ()
 
 
-def section(solid: Manifold, y: float) -> list[list[Point]]:
+def section(solid: Manifold, y: float) -> tuple[tuple[Point, ...], ...]:
     """Return the loops (x, z) of the section of a solid by the plane at `y`, without corners between equal sides."""
     flat: CrossSection = solid.transform(_UPRIGHT).slice(-y + 1 / 3000)
-    return [[(float(x), float(z)) for x, z in loop] for loop in flat.simplify(SAME_MM / 4).to_polygons()]
+    return loops_of(flat.simplify(SAME_MM / 4))
 
 
-def beyond(solid: Manifold, y: float) -> list[list[Point]]:
+def beyond(solid: Manifold, y: float) -> tuple[tuple[Point, ...], ...]:
     """Return the loops (x, z) of the outline of the part of a solid behind the plane at `y`, seen along y.
 
     Of the whole solid, if the part in front is lower or higher.
@@ -90,7 +90,7 @@ def beyond(solid: Manifold, y: float) -> list[list[Point]]:
     left, low, right, high = flat.bounds()
     if max(abs(left - x0), abs(low - z0), abs(right - x1), abs(high - z1)) > SAME_MM / 4:
         flat = solid.transform(_UPRIGHT).project()
-    return [[(float(x), float(z)) for x, z in loop] for loop in flat.simplify(SAME_MM / 4).to_polygons()]
+    return loops_of(flat.simplify(SAME_MM / 4))
 
 
 def from_above(solid: Manifold) -> list[Region]:
@@ -110,8 +110,7 @@ def from_above(solid: Manifold) -> list[Region]:
 
 
 def _region(flat: CrossSection, grey: float) -> Region:
-    loops = tuple(tuple((float(x), float(y)) for x, y in loop) for loop in flat.to_polygons())
-    return Region("", (grey, grey, grey), loops)
+    return Region("", (grey, grey, grey), loops_of(flat))
 
 
 def across(

@@ -76,6 +76,11 @@ class Note:
     at: Point
 
 
+def loops_of(flat: CrossSection) -> tuple[tuple[Point, ...], ...]:
+    """Return the outlines of a flat area, mm: counter-clockwise, holes clockwise."""
+    return tuple(tuple((float(x), float(y)) for x, y in loop) for loop in flat.to_polygons())
+
+
 def cut(
     bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf, swell: float | None = None
 ) -> list[Region]:
@@ -89,8 +94,7 @@ def cut(
         flat: CrossSection = realise(body.shape, segments, swell).transform(_UPRIGHT).slice(HAIR_MM - y)
         if window is not None:
             flat = flat ^ window
-        loops = tuple(tuple((float(px), float(pz)) for px, pz in loop) for loop in flat.to_polygons())
-        if loops:
+        if loops := loops_of(flat):
             regions.append(Region(body.name, body.colour, loops))
     return regions
 

@@ -16,6 +16,14 @@ Bools = NDArray[Any]
 _BLOCK = 1 << 15  # numbers that stay in the processor's cache
 
 
+def open_edges(faces: Ints) -> Ints:
+    """Return the directed edges (n, 2) of faces (m, 3) that no other of them has the other way."""
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
+    many = int(edges.max(initial=0)) + 1
+    open_: Ints = edges[~np.isin(edges @ (many, 1), edges @ (1, many))]
+    return open_
+
+
 def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:
     """Sort `key` (its low `bits` bits); return it and the order that sorts it.
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from unitcad.kernels.mesh import arrays, corners_and_faces
+from unitcad.kernels.mesh import arrays
 from unitcad.kernels.mesh import realise as meshed
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, arc_middle, sides
+from unitcad.shape.tree import corners_and_faces
 
 Point = tuple[float, float, float]
 

@@ -12,11 +12,12 @@ import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType, Manifold
 
 from unitcad.errors import UnitcadError
+from unitcad.geometry.arrays import open_edges
 from unitcad.geometry.components import components
 from unitcad.geometry.segments import between_outlines
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
-from unitcad.shape.profile import FACETS, GRID_PER_MM, Profile, points
-from unitcad.shape.tree import by_quarters
+from unitcad.shape.profile import FACETS, Profile, points
+from unitcad.shape.tree import by_quarters, corners_and_faces
 
 FINEST, COARSEST = 4096, 24
 
@@ -71,7 +72,8 @@ def _made(shape: Shape, segments: int, swell: float) -> Manifold:
         case Extrude(profile, z0, z1, _, Profile() as top):
             return _taper(points(profile, segments), points(top, segments), z0, z1)
         case Polyhedron():
-            return Manifold(manifold3d.Mesh64(*corners_and_faces(shape)))
+            corners, faces = corners_and_faces(shape)
+            return Manifold(manifold3d.Mesh64(corners, faces.astype(np.uint64)))
         case Union(parts):
             return Manifold.batch_boolean([_realise(part, segments, swell) for part in parts], manifold3d.OpType.Add)
         case Cut(body, tools):
@@ -86,12 +88,6 @@ def _made(shape: Shape, segments: int, swell: float) -> Manifold:
         case Below(inner, bottom):
             return _below(_realise(inner, segments, swell), bottom)
     raise TypeError(f"not a shape: {shape!r}")
-
-
-def corners_and_faces(shape: Polyhedron) -> tuple[np.ndarray, np.ndarray]:
-    """Return (corners (n, 3) in mm, double; faces (m, 3))."""
-    corners = np.frombuffer(shape.vertices, "<i4").reshape(-1, 3) / GRID_PER_MM
-    return corners, np.frombuffer(shape.faces, "<i4").reshape(-1, 3).astype(np.uint64)
 
 
 def forget() -> None:
@@ -324,7 +320,7 @@ def _split_at_lines(vertices: np.ndarray, patch: np.ndarray, lines: np.ndarray) 
 
     tree, known = KDTree(lines), len(vertices)
     added, split = [vertices], dict[tuple[int, int], list[int]]()
-    for i, j in _border(patch).tolist():
+    for i, j in open_edges(patch).tolist():
         start, (x, y, rise) = vertices[i], vertices[j] - vertices[i]
         length = math.hypot(x, y)
         near = lines[tree.query_ball_point(start[:2] + np.array([x, y]) / 2, length / 2)] - start[:2]
@@ -350,20 +346,13 @@ def _split_at_lines(vertices: np.ndarray, patch: np.ndarray, lines: np.ndarray) 
     return np.vstack(added), np.array(parts) if parts else patch
 
 
-def _border(patch: np.ndarray) -> np.ndarray:
-    """Return the directed edges (n, 2) of faces that no other of them has the other way."""
-    edges = patch[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    inner = {(int(j), int(i)) for i, j in edges}
-    return np.array([edge for edge in edges.tolist() if tuple(edge) not in inner])
-
-
 def _prism(vertices: np.ndarray, patch: np.ndarray, bottom: float) -> Manifold:
     """Return the solid between upward faces and the plane z = `bottom`."""
     used, patch = np.unique(patch, return_inverse=True)
     patch, n = patch.reshape(-1, 3), len(used)
     roof = vertices[used]
     floor = np.column_stack([roof[:, :2], np.full(n, bottom)])
-    i, j = _border(patch).T
+    i, j = open_edges(patch).T
     walls = np.vstack([np.column_stack([j, i, i + n]), np.column_stack([j, i + n, j + n])])
     triangles = np.vstack([patch, patch[:, ::-1] + n, walls]).astype(np.uint64)
     return Manifold(manifold3d.Mesh64(np.vstack([roof, floor]), triangles))

@@ -7,14 +7,16 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from manifold3d import Error, Manifold, Mesh64
+from manifold3d import Error
 from scipy.spatial import KDTree
 
 from unitcad import files
 from unitcad.errors import Refusal
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints, open_edges
 from unitcad.geometry.components import components
 from unitcad.meshcheck.file_checks import check_file, surface_of
+from unitcad.meshcheck.geometry.mesh import solid_of
+from unitcad.meshcheck.readers.read_stl import RECORD
 from unitcad.meshcheck.rules.f_file import Deadline, Unreadable
 from unitcad.meshcheck.rules.inspection import Options
 
@@ -66,7 +68,7 @@ def joined(corners: Floats) -> tuple[Floats, float] | None:
         moved, index = _clustered(vertices, _open_corners(faces), gap * size)
         found = index[faces]
         found = found[(found != np.roll(found, 1, axis=1)).all(axis=1)]
-        solid = Manifold(Mesh64(moved, found.astype(np.uint64)))
+        solid = solid_of(moved, found)
         if solid.status() == Error.NoError and not solid.is_empty():
             triangles: Floats = moved[found]
             far = float(np.linalg.norm(moved[index] - vertices, axis=1).max())
@@ -76,9 +78,7 @@ def joined(corners: Floats) -> tuple[Floats, float] | None:
 
 def _open_corners(faces: Ints) -> Ints:
     """Return the corners at edges that no face on the other side shares."""
-    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    many = int(faces.max()) + 1
-    return np.unique(edges[~np.isin(edges @ (many, 1), edges @ (1, many))])
+    return np.unique(open_edges(faces))
 
 
 def _clustered(vertices: Floats, loose: Ints, gap: float) -> tuple[Floats, Ints]:
@@ -93,6 +93,6 @@ def _clustered(vertices: Floats, loose: Ints, gap: float) -> tuple[Floats, Ints]
 
 
 def _stl(corners: Floats) -> bytes:
-    records = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+    records = np.zeros(len(corners), RECORD)
     records["corners"] = corners
     return b"repaired copy".ljust(80) + struct.pack("<I", len(corners)) + records.tobytes()

@@ -152,11 +152,11 @@ def tool(moulds: MouldSet, body: Body, places: Sequence[Place]) -> Sheet:
 
     front = (*checked(levels), *checked(shown), *lengths.windows(loops, lambda x, z: _window(solid, cut, x, z)))
     table = [*(holes if len(inside) > 1 else ()), *slices.others(holes)]
-    section = Region("", body.colour, tuple(tuple(loop) for loop in loops))
+    section = Region("", body.colour, loops)
     axes = tuple(row) if holes else ()
     return Sheet(
         facts=(),
-        front=View((section,), front, axes, beyond=tuple(map(tuple, behind))),
+        front=View((section,), front, axes, beyond=behind),
         plan=replace(plan, lengths=checked(plan.lengths)),
         cut=cut,
         holes=tuple(table),

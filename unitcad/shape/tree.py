@@ -16,7 +16,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from unitcad.shape.profile import Profile, ProfileError, mm, rectangle
+import numpy as np
+
+from unitcad.shape.profile import GRID_PER_MM, Profile, ProfileError, mm, rectangle
 
 SCHEMA = 1
 """Part of every hash: raise it when a node's meaning changes."""
@@ -65,6 +67,12 @@ class Polyhedron:
 
     vertices: bytes
     faces: bytes
+
+
+def corners_and_faces(body: Polyhedron) -> tuple[np.ndarray, np.ndarray]:
+    """Return (corners (n, 3) in mm, double; faces (m, 3))."""
+    corners = np.frombuffer(body.vertices, "<i4").reshape(-1, 3) / GRID_PER_MM
+    return corners, np.frombuffer(body.faces, "<i4").reshape(-1, 3).astype(np.int64)
 
 
 @dataclass(frozen=True)

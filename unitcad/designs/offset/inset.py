@@ -17,12 +17,13 @@ from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
-from manifold3d import Manifold, Mesh64
 
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, open_edges
 from unitcad.meshcheck.geometry.distance import squares
+from unitcad.meshcheck.geometry.mesh import solid_of
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import GRID_PER_MM
+from unitcad.shape.tree import corners_and_faces
 from unitcad.spec.body_file import on_grid
 
 MOST_NODES = 1_000_000
@@ -45,7 +46,7 @@ _SEAT = 0.5 / GRID_PER_MM
 
 def side_of(body: Polyhedron, thickness: float, by: float) -> float:
     """Return the side of the lattice for a layer of a thickness, and an offset of `by`, mm."""
-    size = float(np.prod(np.maximum(np.ptp(arrays_of(body)[0], axis=0) - (by, by, 0), by)))
+    size = float(np.prod(np.maximum(np.ptp(corners_and_faces(body)[0], axis=0) - (by, by, 0), by)))
     return max(SHARE * thickness / CIRCLE, LEAST_SIDE, (size / MOST_NODES) ** (1 / 3))
 
 
@@ -55,7 +56,7 @@ def inset(body: Polyhedron, by: float, side: float) -> Polyhedron | None:
 
     It reaches a little under the seat. `side`: that of the lattice, mm, at most half of `by`.
     """
-    corners, faces = arrays_of(body)
+    corners, faces = corners_and_faces(body)
     low, high = corners.min(axis=0) + by - side, corners.max(axis=0) - by + side
     # Levels of the lattice are on the seat.
     low[2] = -2 * side
@@ -67,10 +68,10 @@ def inset(body: Polyhedron, by: float, side: float) -> Polyhedron | None:
     border = np.ones(depth.shape, bool)
     border[1:-1, 1:-1, 1:-1] = False
     depth[border] = -side
-    found = Manifold(Mesh64(*_level(depth, low, side)))
+    found = solid_of(*_level(depth, low, side))
     # Outside the body too there are nodes far from its surface.
     deep = np.where(corners[:, 2:] <= _SEAT, [0, 0, low[2]], 0.0)
-    reach = Manifold(Mesh64(corners + deep, faces.astype(np.uint64)))
+    reach = solid_of(corners + deep, faces)
     pieces = [piece for piece in found.decompose() if (piece ^ reach).volume() > piece.volume() / 2 > 0]
     if not pieces:
         return None
@@ -100,7 +101,7 @@ def _level(values: Floats, low: Floats, side: float) -> tuple[Floats, Ints]:
     first, last = (np.stack(np.unravel_index(end, shape), axis=1) for end in pairs.T)
     share = flat[pairs[:, 0]] / (flat[pairs[:, 0]] - flat[pairs[:, 1]])
     corners = low + side * (first + share[:, None] * (last - first))
-    return corners, index.reshape(-1, 3).astype(np.uint64)
+    return corners, index.reshape(-1, 3)
 
 
 def _cases() -> list[list[list[list[int]]]]:
@@ -187,9 +188,7 @@ def _off_seat(corners: Floats, faces: Ints) -> Bools:
 def _skirted(corners: Floats, faces: Ints, deep: float) -> tuple[Floats, Ints]:
     """Return a surface without its faces on the seat; from their border it goes on straight down."""
     faces = faces[_off_seat(corners, faces)]
-    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    there, back = edges @ (len(corners), 1), edges @ (1, len(corners))
-    a, b = edges[~np.isin(there, back)].T
+    a, b = open_edges(faces).T
     below = np.full(len(corners), -1)
     rim = np.unique(a)
     below[rim] = len(corners) + np.arange(len(rim))
@@ -230,9 +229,3 @@ def _fine(pieces: Floats, side: float) -> Floats:
         middle = np.concatenate([(a + b)[:, :3] / 2, np.maximum(a, b)[:, 3:6], np.minimum(a, b)[:, 6:]], axis=1)
         pieces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
     return np.concatenate(done)
-
-
-def arrays_of(body: Polyhedron) -> tuple[Floats, Ints]:
-    """Return corners (n, 3) in mm and faces (m, 3) of a body from a file."""
-    corners = np.frombuffer(body.vertices, "<i4").reshape(-1, 3) / GRID_PER_MM
-    return corners, np.frombuffer(body.faces, "<i4").reshape(-1, 3).astype(np.int64)

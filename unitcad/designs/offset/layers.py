@@ -20,16 +20,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from manifold3d import Manifold, Mesh64
+from manifold3d import Manifold
 from msgspec import UNSET
 
 from unitcad.designs.design import BEYOND, Design, circuit, motor, wires
 from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
-from unitcad.designs.offset.inset import CIRCLE, arrays_of, inset, side_of, without_bottom
+from unitcad.designs.offset.inset import CIRCLE, inset, side_of, without_bottom
 from unitcad.errors import Refusal
 from unitcad.meshcheck.geometry.distance import nearest_of
+from unitcad.meshcheck.geometry.mesh import solid_of
 from unitcad.shape import Polyhedron, Shape, box, cut, cylinder, moved, union
 from unitcad.shape.profile import GRID_PER_MM, mm
+from unitcad.shape.tree import corners_and_faces
 from unitcad.spec import Spec
 from unitcad.spec.body_file import bodies_in
 from unitcad.spec.raw import LEAST_LAYER, BodyTable
@@ -58,7 +60,7 @@ def body_of(file: str, source: str) -> tuple[Polyhedron, tuple[float, float, flo
 
 def size_of(body: BodyTable) -> tuple[float, float, float]:
     """Return the lengths of a body's box, mm."""
-    x, y, z = np.ptp(arrays_of(body_of(body.file, body.file_source or "")[0])[0], axis=0).tolist()
+    x, y, z = np.ptp(corners_and_faces(body_of(body.file, body.file_source or "")[0])[0], axis=0).tolist()
     return x, y, z
 
 
@@ -150,11 +152,11 @@ def _check_motor(spec: Spec, plan: _Plan, dims: Dimensions) -> None:
     points = np.concatenate(
         [np.stack([x + r * np.cos(turn), y + r * np.sin(turn), np.full(96, level)], axis=1) for r, level in rings]
     )
-    corners, faces = arrays_of(plan.body)
+    corners, faces = corners_and_faces(plan.body)
     pocket = Manifold.cylinder(top - z, radius, circular_segments=96).translate((x, y, z))
     needed = plan.depths[plan.first] + LEAST_LAYER
     says = f"{number(needed, 3)} mm is needed: the layers round it and {LEAST_LAYER:g} mm of layer {plan.first + 1}"
-    if (pocket - Manifold(Mesh64(corners, faces.astype(np.uint64)))).volume() > 1e-3 * pocket.volume():
+    if (pocket - solid_of(corners, faces)).volume() > 1e-3 * pocket.volume():
         raise Refusal("motor.at", given, f"the motor would stick out of the body; {says}")
     away = nearest_of(without_bottom(corners, faces)).distances(points)
     if away.min() < needed - plan.side / 4:
